@@ -1,0 +1,316 @@
+"""What happens: the declarations of a concrete scenario (every number fixed). SI units, angles in degrees.
+
+Strict and frozen; unknown keys are refused at every depth. A scenario *file* may hold a distribution
+wherever a number stands; `load.py` draws it by seed before these models see it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=64)]
+Category = Literal["car", "rider", "pedestrian", "tree", "post", "building", "board"]
+
+
+class Spec(BaseModel):
+    """Base of every declaration. A rule that joins several fields raises `broken`, which names the field."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, data: Any) -> Any:
+        unknown = [key for key in data if key not in cls.model_fields] if isinstance(data, dict) else []
+        if unknown:
+            known = tuple(cls.model_fields)
+            raise PydanticCustomError("unknown_key", "unknown key {key}", {"key": unknown[0], "known": known})
+        return data
+
+
+def broken(problem: str, *field: str | int) -> PydanticCustomError:
+    """A broken rule about `field` (a path within the model), to be raised in a validator."""
+    return PydanticCustomError("rule", "{problem}", {"problem": problem, "field": field})
+
+
+class Path(Spec):
+    """A drive over waypoints (world x east, y north) at a piecewise linear speed; heading follows the path.
+
+    Two waypoints are a straight line, more are a C2 spline through them. Past either end the path goes on
+    straight. With one waypoint the path is the straight line from it along `heading_deg` (0 = east,
+    counter-clockwise), which is given then only. `speed_mps` is one number or points (time s, speed m/s).
+    At time 0 the actor is at the first waypoint.
+    """
+
+    waypoints_m: tuple[tuple[Finite, Finite], ...] = Field(min_length=1)
+    speed_mps: NonNegative | tuple[tuple[NonNegative, NonNegative], ...] = 0.0
+    heading_deg: Finite = 0.0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Path:
+        points = self.waypoints_m
+        for i in range(1, len(points)):
+            if points[i] == points[i - 1]:
+                raise broken("is the same point as the one before", "waypoints_m", i)
+        if len(points) > 1 and self.heading_deg != 0.0:
+            raise broken("counts for a path of one waypoint only; more give the heading", "heading_deg")
+        if isinstance(self.speed_mps, tuple):
+            if not self.speed_mps:
+                raise broken("needs at least one (time, speed)", "speed_mps")
+            for i in range(1, len(self.speed_mps)):
+                if self.speed_mps[i][0] <= self.speed_mps[i - 1][0]:
+                    raise broken("is not later than the time before", "speed_mps", i, 0)
+        return self
+
+
+class Actor(Spec):
+    """A scripted body. `scale`: size relative to the part's own, the same on all axes (targets vary ±8 %)."""
+
+    part: Name  # a file of scenarios/parts
+    category: Category
+    path: Path
+    scale: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 1.0
+
+
+class Scatter(Spec):
+    """`count` things of one part, placed by seed in `area_m` (x0, y0, x1, y1): no overlaps, off the lanes."""
+
+    part: Name
+    category: Category
+    count: Annotated[int, Field(ge=0, le=500)]
+    area_m: tuple[Finite, Finite, Finite, Finite]
+    speed_mps: NonNegative = 0.0  # walking pedestrians
+    scale_spread: Annotated[float, Field(ge=0, le=0.3)] = 0.08
+    align_deg: Finite | None = None  # fixed heading; None: any
+
+    @model_validator(mode="after")
+    def _area_is_not_empty(self) -> Scatter:
+        x0, y0, x1, y1 = self.area_m
+        if x1 <= x0 or y1 <= y0:
+            raise broken("must be x0, y0, x1, y1 with x1 > x0 and y1 > y0", "area_m")
+        return self
+
+
+class Road(Spec):
+    """A paved strip along x. `lanes_m`: (y0, y1) of the strips that are driven, free of background."""
+
+    kind: Literal["lot", "road"] = "lot"
+    length_m: Positive = 400.0
+    width_m: Positive = 60.0
+    lanes_m: tuple[tuple[Finite, Finite], ...] = ()
+
+    @model_validator(mode="after")
+    def _lanes_are_on_the_road(self) -> Road:
+        for i, (y0, y1) in enumerate(self.lanes_m):
+            if not -0.5 * self.width_m <= y0 < y1 <= 0.5 * self.width_m:
+                raise broken("must be y0, y1 with y0 < y1, both on the road's width", "lanes_m", i)
+        return self
+
+
+class System(Spec):
+    """Who senses whom, with what, for how long. Actors are by name; `target` may be null."""
+
+    duration_s: Annotated[float, Field(gt=0, le=3600, allow_inf_nan=False)]
+    ego: Name
+    target: Name | None
+    rig: Name  # a file of scenarios/rigs
+    actors: dict[Name, Actor]
+
+    @model_validator(mode="after")
+    def _ego_and_target_are_actors(self) -> System:
+        for field, name in (("ego", self.ego), ("target", self.target)):
+            if name is not None and name not in self.actors:
+                raise broken(f"'{name}' is not one of the actors ({', '.join(self.actors) or 'none'})", field)
+        if self.ego == self.target:
+            raise broken("the target must be another actor than the ego", "target")
+        return self
+
+
+class Scenario(Spec):
+    """One concrete scenario. `faults` is checked by `faults.py`."""
+
+    name: Name
+    description: str
+    road: Road
+    systems: dict[Literal["car", "wearable"], System] = Field(min_length=1)
+    background: tuple[Scatter, ...] = ()
+    faults: dict[str, object] = {}
+
+    def system(self, name: str) -> System:
+        """The system of that name. KeyError: the scenario has none."""
+        for key, system in self.systems.items():
+            if key == name:
+                return system
+        raise KeyError(name)
+
+
+# -- sensors and rigs -----------------------------------------------------------------------------------
+
+
+class Pose(Spec):
+    """Of a sensor on its rig: metres in the ego frame, then roll, pitch, yaw in degrees.
+
+    The rotation is Rz(yaw) Ry(pitch) Rx(roll). A camera's is of its viewing direction: yaw 90 looks left,
+    pitch > 0 looks down.
+    """
+
+    xyz_m: tuple[Finite, Finite, Finite]
+    rpy_deg: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+
+
+class ReturnNoise(Spec):
+    """Range noise, 1 SD in metres, at high, medium and low return strength; interpolated between them."""
+
+    high_m: NonNegative
+    medium_m: NonNegative
+    low_m: NonNegative
+
+
+class LidarSensor(Spec):
+    """A spinning LiDAR. Azimuth offsets are of each beam against the column's encoder angle."""
+
+    kind: Literal["lidar"]
+    rate_hz: Positive
+    columns: Annotated[int, Field(ge=1, le=8192)]
+    clockwise: bool  # seen from above
+    start_azimuth_deg: Finite  # where a sweep starts, in the LiDAR frame
+    elevation_deg: tuple[Finite, ...]
+    azimuth_offset_deg: tuple[Finite, ...]
+    min_range_m: NonNegative
+    range_at_10_percent_m: Positive  # farthest return of a 10 % reflecting target
+    range_at_80_percent_m: Positive
+    resolution_m: NonNegative
+    noise: ReturnNoise
+    angle_noise_deg: NonNegative
+    false_positive_rate: Annotated[float, Field(ge=0, le=1)]
+    latency_ms: NonNegative  # from the last firing to the delivery
+    source: str
+
+    @model_validator(mode="after")
+    def _tables_fit(self) -> LidarSensor:
+        beams, offsets = len(self.elevation_deg), len(self.azimuth_offset_deg)
+        if beams == 0:
+            raise broken("needs at least one beam", "elevation_deg")
+        if beams != offsets:
+            raise broken(f"has {offsets} values for {beams} beams", "azimuth_offset_deg")
+        for i, elevation in enumerate(self.elevation_deg):
+            if abs(elevation) >= 90.0:
+                raise broken("must lie between -90 and 90", "elevation_deg", i)
+        if self.range_at_80_percent_m < self.range_at_10_percent_m:
+            raise broken("must not be below range_at_10_percent_m", "range_at_80_percent_m")
+        if self.min_range_m >= self.range_at_10_percent_m:
+            raise broken("must be below range_at_10_percent_m", "min_range_m")
+        return self
+
+
+class CameraSensor(Spec):
+    """A camera. `trigger`: `lidar_angle` exposes when the spinning LiDAR passes `trigger_deg` (in its frame);
+    `free_run` exposes on its own at `rate_hz`, its phase drawn by seed within ±`phase_ms` of that instant."""
+
+    kind: Literal["camera"]
+    rate_hz: Positive
+    width_px: Annotated[int, Field(ge=16, le=8192)]
+    height_px: Annotated[int, Field(ge=16, le=8192)]
+    fov_deg: Annotated[float, Field(gt=1, lt=170)]  # horizontal
+    distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    monochrome: bool = False
+    trigger: Literal["lidar_angle", "free_run"]
+    trigger_deg: Finite = 0.0
+    phase_ms: NonNegative = 0.0
+    exposure_ms: NonNegative
+    stamp: Literal["mid_exposure", "trigger", "arrival"]
+    latency_ms: NonNegative  # from mid-exposure to the delivery of the detections
+    source: str
+
+    @model_validator(mode="after")
+    def _timing_fits(self) -> CameraSensor:
+        period_ms = 1e3 / self.rate_hz
+        if self.exposure_ms > period_ms:
+            raise broken(f"is longer than a period of {period_ms:g} ms", "exposure_ms")
+        if self.phase_ms > 0.5 * period_ms:
+            raise broken(f"is more than half a period of {period_ms:g} ms", "phase_ms")
+        if self.trigger == "lidar_angle" and self.phase_ms != 0.0:
+            raise broken("counts for trigger free_run only", "phase_ms")
+        if self.trigger == "free_run" and self.stamp == "trigger":
+            raise broken("a free running camera has no trigger to stamp", "stamp")
+        return self
+
+
+class GnssSensor(Spec):
+    """RTK receivers on ego and target. Bias is drawn once a pass, noise each fix (both 1 SD, per axis).
+
+    The ego's antenna is where the rig mounts this sensor.
+    """
+
+    kind: Literal["gnss"]
+    rate_hz: Positive
+    bias_m: NonNegative
+    noise_m: NonNegative
+    latency_ms: NonNegative
+    heading_deg: NonNegative  # 1 SD of the constant heading error of a pass
+    target_lever_m: tuple[Finite, Finite, Finite]  # antenna against the box centre, target's frame
+    source: str
+
+
+class ImuSensor(Spec):
+    """Gyro on the ego's body, and the wheel odometer that comes with it."""
+
+    kind: Literal["imu"]
+    rate_hz: Positive
+    gyro_noise_dps_rthz: NonNegative
+    gyro_bias_dps: NonNegative
+    odometer_scale_error: NonNegative  # 1 SD, relative, constant over a run
+    odometer_step_mps: NonNegative
+    latency_ms: NonNegative
+    source: str
+
+
+Sensor = LidarSensor | CameraSensor | GnssSensor | ImuSensor
+
+SENSOR_KINDS: dict[str, type[LidarSensor | CameraSensor | GnssSensor | ImuSensor]] = {
+    "lidar": LidarSensor,
+    "camera": CameraSensor,
+    "gnss": GnssSensor,
+    "imu": ImuSensor,
+}
+
+
+class DetectorSpec(Spec):
+    """The 2-D detector. Recall is logistic in box height and visible fraction; misses come in bursts."""
+
+    min_height_px: NonNegative = 12.0
+    min_visible_fraction: Annotated[float, Field(ge=0, le=1)] = 0.2
+    recall_at_best: Annotated[float, Field(gt=0, le=1)] = 0.99
+    recall_half_height_px: Positive = 10.0
+    miss_burst_frames: Annotated[float, Field(ge=1)] = 2.0  # mean length of a burst of misses
+    false_boxes_per_image: NonNegative = 0.02
+    categories: tuple[Category, ...] = ("car", "rider", "pedestrian", "board")
+
+
+class Mount(Spec):
+    """A sensor file on a rig. `trigger_deg` (cameras only) overrides the sensor file's."""
+
+    sensor: Name  # a file of scenarios/sensors
+    pose: Pose
+    trigger_deg: Finite | None = None
+
+
+class Rig(Spec):
+    """Sensors by their name on the rig; exactly one LiDAR, which stands above the ego frame's origin.
+
+    `body` says whose shake the rig follows. `ego_origin_m`: where the ego frame's origin lies on the carrying
+    part: metres forward and left of the part's own origin.
+    """
+
+    name: Name
+    description: str
+    body: Literal["vehicle", "rider"]
+    ego_origin_m: tuple[Finite, Finite] = (0.0, 0.0)
+    sensors: dict[Name, Mount]
+    detector: DetectorSpec = DetectorSpec()
+    source: str

@@ -1,0 +1,240 @@
+"""Fault specs and sets: laws of override, off is never mentioned, bad input, severities."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scenarios.errors import BadInput, Where
+from scenarios.fault_set import (
+    FaultChange,
+    FaultSet,
+    describe_faults,
+    list_fault_sets,
+    load_fault_set,
+    parse_fault_arguments,
+    parse_faults,
+)
+from scenarios.faults import FAULTS, EdgeError, TriggerOffset, Vibration
+from scenarios.severity import SEVERITIES, road_class, severe
+
+FILE = Where(file="f.yaml")
+# Plain inputs, parsed inside the tests: type checks draw at random, which a strategy must not.
+SETS = st.dictionaries(st.sampled_from(sorted(FAULTS)), st.sampled_from([0, 0.0, 0.5, 1]), max_size=5)
+CHANGES = st.lists(
+    st.one_of(
+        st.just("none"),
+        st.just("demo"),
+        st.tuples(st.sampled_from(sorted(FAULTS)), st.sampled_from([0, 0.25, 1])).map(
+            lambda p: f"{p[0]}={p[1]}"
+        ),
+    ),
+    max_size=4,
+)
+
+NOTHING = FaultChange()
+CLEAR = FaultChange(clears=True)
+
+Raw = dict[str, float]
+
+
+@given(raw=SETS)
+def test_no_change_changes_nothing_and_none_clears(raw: Raw) -> None:
+    base = parse_faults(raw, FILE)
+    assert base.override(NOTHING) == base and base.override(NOTHING).label == base.label
+    assert base.override(CLEAR) == FaultSet() and base.override(CLEAR).label == "none"
+
+
+@given(raw=SETS, arguments=CHANGES)
+def test_a_change_made_twice_is_a_change_made_once(raw: Raw, arguments: list[str]) -> None:
+    base, change = parse_faults(raw, FILE), parse_fault_arguments(arguments)
+    assert base.override(change).override(change) == base.override(change)
+
+
+@given(raw=SETS, first=CHANGES, second=CHANGES)
+def test_two_changes_in_a_row_are_their_combination(raw: Raw, first: list[str], second: list[str]) -> None:
+    base, a, b = parse_faults(raw, FILE), parse_fault_arguments(first), parse_fault_arguments(second)
+    assert base.override(a).override(b) == base.override(a.then(b))
+    assert parse_fault_arguments(first + second) == a.then(b)
+
+
+@given(first=CHANGES, second=CHANGES, third=CHANGES)
+def test_combining_changes_is_associative_with_a_neutral_one(
+    first: list[str], second: list[str], third: list[str]
+) -> None:
+    a, b, c = (parse_fault_arguments(arguments) for arguments in (first, second, third))
+    assert a.then(b).then(c) == a.then(b.then(c))
+    assert NOTHING.then(a) == a == a.then(NOTHING)
+
+
+@given(raw=SETS, arguments=CHANGES)
+def test_a_change_replaces_its_own_keys_and_leaves_the_others(raw: Raw, arguments: list[str]) -> None:
+    base, change = parse_faults(raw, FILE), parse_fault_arguments(arguments)
+    after = {spec.name: spec for spec in base.override(change)}
+    for spec in change.specs:
+        assert after.pop(spec.name, None) == (None if spec.is_off else spec)
+    before = {} if change.clears else {spec.name: spec for spec in base}
+    assert after == {name: before[name] for name in before if name not in {s.name for s in change.specs}}
+
+
+@given(raw=SETS)
+def test_a_fault_that_is_off_is_as_if_never_mentioned(raw: Raw) -> None:
+    without = {name: value for name, value in raw.items() if value != 0}
+    found = parse_faults(raw, FILE)
+    assert found == parse_faults(without, FILE)
+    assert [spec.name for spec in found] == sorted(without)
+    assert not any(spec.is_off for spec in found)
+
+
+@given(raw=SETS)
+def test_a_set_is_read_back_from_its_own_data(raw: Raw) -> None:
+    base = parse_faults(raw, FILE)
+    assert parse_faults(base.as_data(), FILE) == base
+
+
+@pytest.mark.parametrize("name", sorted(FAULTS))
+def test_a_bare_number_sets_the_strength_and_zero_is_off(name: str) -> None:
+    kind = FAULTS[name]
+    bare, full = parse_faults({name: 0.5}, FILE), parse_faults({name: {kind.strength: 0.5}}, FILE)
+    assert bare == full and getattr(bare.specs[0], kind.strength) == 0.5
+    assert len(parse_faults({name: 0}, FILE)) == 0
+    assert (
+        kind.name == name and (kind.__doc__ or "").count("Unit:") == 1 and "Source:" in (kind.__doc__ or "")
+    )
+
+
+def test_jitter_or_bias_alone_is_not_off() -> None:
+    assert not TriggerOffset(jitter_ms=1.0).is_off
+    assert not EdgeError(sd_fraction=0.0, bias_fraction=-0.1).is_off
+    assert TriggerOffset(sensors=("cam",)).is_off
+
+
+def test_the_set_of_a_class_is_found_by_the_class() -> None:
+    faults = parse_faults({"motion.vibration_deg": 0.5}, FILE)
+    found = faults.get(Vibration)
+    assert found is not None and found.rms_deg == 0.5 and found.heave_m_per_deg == 0.02
+    assert faults.get(TriggerOffset) is None
+
+
+def test_the_demo_has_a_trigger_offset_of_50_ms_and_a_named_road() -> None:
+    demo = FaultSet().override(parse_fault_arguments(["demo"]))
+    offset, vibration = demo.get(TriggerOffset), demo.get(Vibration)
+    assert demo.label == "demo" and len(demo) == 2
+    assert offset is not None and (offset.offset_ms, offset.sensors) == (50.0, "cameras")
+    assert vibration is not None and road_class(vibration.rms_deg, "car") == "E"
+    assert "demo" in list_fault_sets()
+
+
+def test_arguments_are_read_in_their_order() -> None:
+    change = parse_fault_arguments(["demo", "timing.trigger_offset_ms={offset_ms: 5, jitter_ms: 1}"])
+    offset = FaultSet().override(change).get(TriggerOffset)
+    assert offset is not None and (offset.offset_ms, offset.jitter_ms) == (5.0, 1.0)
+    assert change.label == "demo+timing.trigger_offset_ms={offset_ms: 5, jitter_ms: 1}"
+    assert parse_fault_arguments(["demo", "none"]) == CLEAR
+    assert parse_fault_arguments(["none", "demo"]).label == "demo"
+
+
+def test_a_fault_set_may_be_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "late.yaml"
+    path.write_text("description: Late\nfaults:\n  timing.trigger_offset_ms: 30\n")
+    change = load_fault_set(str(path))
+    assert change.label == "late" and change.specs == (TriggerOffset(offset_ms=30.0),)
+    path.write_text("faults:\n  motion.flex_deg: 1\n  motion.flx_deg: 1\n")
+    with pytest.raises(BadInput, match=r"late.yaml, line 3, faults.motion.flx_deg: unknown fault"):
+        load_fault_set(str(path))
+    path.write_text("fault: {}\n")
+    with pytest.raises(BadInput, match="a fault set is a mapping with 'faults'"):
+        load_fault_set(str(path))
+    path.write_text("faults: {}\nseverity: 3\n")
+    with pytest.raises(BadInput, match="line 2, severity: unknown key"):
+        load_fault_set(str(path))
+
+
+@pytest.mark.parametrize(
+    ("argument", "says"),
+    [
+        ("demmo", "did you mean 'demo'?"),
+        ("motion.flex_deg", "needs a value, as in motion.flex_deg=1"),
+        ("motion.flex_deg=", "needs a value"),
+        ("motion.flex=1", "did you mean 'motion.flex_deg'?"),
+        ("motion.flex_deg=nan", "not finite"),
+        ("motion.flex_deg=.inf", "not finite"),
+        ("motion.flex_deg=much", "must be a number, is 'much'"),
+        ("motion.flex_deg=true", "must be a number or a mapping, is true"),
+        ("motion.flex_deg=[1]", "must be a number or a mapping, is a list"),
+        ("motion.flex_deg=null", "must be a number or a mapping, is null"),
+        ("motion.flex_deg=-0.1", "rms_deg: must not be negative, is -0.1"),
+        ("motion.flex_deg={rms: 1}", "did you mean 'rms_deg'?"),
+        ("motion.flex_deg={rms_deg: 1", "not YAML"),
+        ("motion.flex_deg={stiffness: sof}", "did you mean 'soft'?"),
+        ("motion.flex_deg={sensors: cam-front}", "allowed: cameras or a list"),
+        ("motion.flex_deg={sensors: []}", "names no camera"),
+        ("motion.flex_deg={sensors: [a, a]}", "names a camera twice"),
+        ("motion.flex_deg={uniform: [1, 2]}", "unknown key 'uniform'"),
+        ("timing.trigger_offset_ms=1001", "must be <= 1000"),
+        ("timing.trigger_offset_ms={jitter_ms: -1}", "jitter_ms: must not be negative"),
+        ("calibration.rotation_deg={axis: up}", "allowed: random, roll, pitch, yaw"),
+        ("detector.edge_error={tau_s: -1}", "tau_s: must not be negative"),
+        ("away/faults.yaml", "away/faults.yaml: no such file"),
+        ("", "is empty"),
+    ],
+)
+def test_a_bad_argument_is_refused_in_one_sentence(argument: str, says: str) -> None:
+    with pytest.raises(BadInput) as caught:
+        parse_fault_arguments([argument])
+    assert says in str(caught.value) and str(caught.value).isprintable()
+    assert "pydantic" not in str(caught.value).lower()
+
+
+def test_a_camera_that_the_rig_lacks_is_refused() -> None:
+    faults = parse_faults({"motion.flex_deg": {"rms_deg": 1, "sensors": ["cam-left"]}}, FILE)
+    faults.check_cameras(("cam-left", "cam-right"), FILE)
+    with pytest.raises(BadInput, match=r"f.yaml, motion.flex_deg.sensors: unknown camera 'cam-left'"):
+        faults.check_cameras(("cam-centre", "cam-right"), FILE)
+
+
+def test_severities_rise_and_make_valid_specs() -> None:
+    for severity in SEVERITIES:
+        assert list(severity.values) == sorted(set(severity.values))
+        for level, value in enumerate(severity.values, 1):
+            spec = severe(severity.fault, level, severity.profile or "car")
+            assert getattr(spec, spec.strength) == value and not spec.is_off
+    with pytest.raises(BadInput, match="1 to 5"):
+        severe("motion.flex_deg", 6)
+    with pytest.raises(BadInput, match="has no severities"):
+        severe("detector.edge_error", 1)
+
+
+@pytest.mark.parametrize(
+    ("rms_deg", "profile", "letter"),
+    [
+        (0.0, "car", "A"),
+        (0.07, "car", "A"),
+        (0.28, "car", "C"),
+        (0.55, "car", "D"),
+        (1.1, "car", "E"),
+        (1.55, "car", "E"),
+        (1.56, "car", "beyond E: stress only"),
+        (2.0, "car", "beyond E: stress only"),
+        (0.42, "rider", "C"),
+        (2.0, "rider", "E"),
+        (3.0, "rider", "beyond E: stress only"),
+    ],
+)
+def test_a_vibration_level_has_the_road_class_that_gives_it(
+    rms_deg: float, profile: str, letter: str
+) -> None:
+    assert road_class(rms_deg, profile) == letter  # type: ignore[arg-type]
+
+
+def test_every_fault_is_listed_with_unit_fields_and_severities() -> None:
+    rows = describe_faults()
+    assert [row["name"] for row in rows] == sorted(FAULTS)
+    trigger = next(row for row in rows if row["name"] == "timing.trigger_offset_ms")
+    assert trigger["unit"] == "ms" and trigger["bare_number_sets"] == "offset_ms"
+    assert trigger["fields"] == {"offset_ms": 0.0, "jitter_ms": 0.0, "sensors": "cameras"}
+    assert trigger["severities"][0]["values"] == (2.0, 10.0, 30.0, 50.0, 100.0)
+    assert all(row["summary"].endswith(".") for row in rows)
