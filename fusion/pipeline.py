@@ -11,7 +11,8 @@ A pipeline is any object with three methods. The bench makes it by calling its f
 
 A pipeline sees no truth and no simulator time. It may return the time of its steps by a method
 `timings_ns() -> Mapping[str, Sequence[int]]` (step name -> nanoseconds, one number per scan since `reset`),
-which the bench reports when it is there.
+which the bench reports when it is there. A class attribute `reads_images = False` says that it ignores
+`CameraImage` messages: they are then not rendered, unless another pipeline of the run reads them.
 """
 
 from __future__ import annotations

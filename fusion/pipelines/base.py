@@ -33,6 +33,7 @@ class ScanPipeline(ABC):
     Images and ego motion are ignored: the paper's method uses detections only and does not deskew.
     """
 
+    reads_images: ClassVar[bool] = False
     steps: ClassVar[tuple[str, ...]]  # names for `timings_ns`; "smooth" is added
 
     def __init__(self, smoother: SmootherConfig) -> None:

@@ -1,0 +1,384 @@
+"""The command line: `simbench demo | run | list | describe | doctor | learn`.
+
+Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
+match, a crash of ours), 5 nothing selected.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from simbench.run import Job, JobResult
+
+BASELINES = ("static_projection", "static_projection_ground", "probabilistic")
+FAILED, BAD_INPUT, BENCH_ERROR, NOTHING = 1, 2, 3, 5
+
+
+class _Cli(click.Group):
+    """Turns usage errors and bad input into one sentence on stderr and exit code 2."""
+
+    def main(self, *args: Any, **kwargs: Any) -> Any:
+        try:
+            code = super().main(*args, **{**kwargs, "standalone_mode": False})
+        except click.exceptions.NoArgsIsHelpError as help_page:
+            help_page.show()
+            raise SystemExit(BAD_INPUT) from None
+        except click.ClickException as error:
+            click.echo(f"simbench: {error.format_message()}", err=True)
+            raise SystemExit(BAD_INPUT) from None
+        except click.Abort:
+            raise SystemExit(130) from None
+        except Exception as error:
+            if not _is_users(error):
+                raise
+            click.echo(f"simbench: {error}", err=True)
+            raise SystemExit(BAD_INPUT) from None
+        raise SystemExit(code if isinstance(code, int) else 0)
+
+
+def _is_users(error: Exception) -> bool:
+    """Whether an error is about what the user gave or what the machine lacks."""
+    from scenarios.errors import BadInput
+
+    if isinstance(error, BadInput):
+        return True
+    module = sys.modules.get("simbench.sensors.gl")
+    return module is not None and isinstance(error, module.RenderingUnavailable)
+
+
+@click.group(cls=_Cli, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="simbench")
+def main() -> None:
+    """Test bench for LiDAR-camera fusion: inject errors into a simulated drive, score what is recovered."""
+
+
+def _seeds(_: click.Context, __: click.Parameter, text: str) -> tuple[int, ...]:
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        if not first.isdigit() or (dash and not last.isdigit()):
+            raise click.BadParameter(f"'{text}' is not a list of seeds; allowed: 0-3 or 0,2,5")
+        low, high = int(first), int(last) if dash else int(first)
+        if high < low or high - low >= 100_000:
+            raise click.BadParameter(f"'{part}' is not a range of seeds from low to high")
+        found += [seed for seed in range(low, high + 1) if seed not in found]
+    return tuple(found)
+
+
+def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    width, cross, height = text.partition("x")
+    if not cross or not width.isdigit() or not height.isdigit():
+        raise click.BadParameter(f"'{text}' is not an image size; allowed: 960x600")
+    if not (64 <= int(width) <= 2048 and 64 <= int(height) <= 2048):
+        raise click.BadParameter(f"'{text}' is out of range; allowed: 64x64 to 2048x2048")
+    return int(width), int(height)
+
+
+def _common(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options that `demo` and `run` share; `folder`: where results go unless told."""
+    options = (
+        click.option("--seeds", default="0-1", callback=_seeds, help="Runs to make: 0-3 or 0,2,5."),
+        click.option(
+            "--images", type=click.Choice(["none", "gl"]), default="gl", help="Render pictures, or not."
+        ),
+        click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores)."),
+        click.option(
+            "--out",
+            type=click.Path(path_type=Path),
+            default=Path(folder),
+            show_default=True,
+            help="Folder for result.json, report.html and the video.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+        click.option("--size", callback=_size, default=None, help="Image size in pixels, e.g. 960x600."),
+    )
+
+    def add(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+@main.command()
+@_common("out/demo")
+def demo(
+    seeds: tuple[int, ...],
+    images: str,
+    jobs: int | None,
+    out: Path,
+    as_json: bool,
+    size: tuple[int, int] | None,
+) -> None:
+    """A car overtakes an e-scooter; cameras are 50 ms late, the body shakes; both rigs, one page.
+
+    Example: simbench demo --out out/demo
+    """
+    from simbench.run import Job
+
+    planned = [
+        Job(
+            scenario="overtake-approach", system=system, seed=seed, pipelines=BASELINES, faults=(faults,),
+            images="gl" if images == "gl" and faults == "demo" else "none", size_px=size,
+        )
+        for system in ("car", "wearable")
+        for seed in seeds
+        for faults in ("none", "demo")
+    ]  # fmt: skip
+    _execute(planned, out, images, jobs, as_json)
+
+
+@main.command()
+@click.argument("targets", nargs=-1, metavar="TARGET...")
+@click.option("--system", type=click.Choice(["car", "wearable", "both"]), default="both", help="Which rig.")
+@click.option(
+    "--pipeline", "pipelines", multiple=True, metavar="NAME", help="May be repeated. Default: all ours."
+)
+@click.option(
+    "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE",
+    help="Replaces the scenario's same fault, adds the others; 'none' clears. May be repeated.",
+)  # fmt: skip
+@_common("out/run")
+def run(
+    targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
+    seeds: tuple[int, ...], images: str, jobs: int | None, out: Path, as_json: bool,
+    size: tuple[int, int] | None,
+) -> None:  # fmt: skip
+    """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
+
+    Example: simbench run overtake-approach --system car --faults timing.trigger_offset_ms=50 --seeds 0-1
+    """
+    from scenarios.fault_set import parse_fault_arguments
+    from scenarios.load import load_scenario
+    from simbench.plugins import load_pipeline
+    from simbench.run import Job
+
+    if not targets:
+        click.echo("simbench: nothing selected: name at least one scenario (see 'simbench list').", err=True)
+        raise SystemExit(NOTHING)
+    chosen = tuple(dict.fromkeys(pipelines)) or BASELINES
+    for name in chosen:
+        load_pipeline(name)
+    parse_fault_arguments(faults)
+    planned = []
+    for target in targets:
+        family = load_scenario(target)
+        systems = family.system_names if system == "both" else (system,)
+        planned += [
+            Job(
+                scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
+                images="gl" if images == "gl" else "none", size_px=size,
+            )
+            for name in systems
+            for seed in seeds
+        ]  # fmt: skip
+    _execute(planned, out, images, jobs, as_json)
+
+
+def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as_json: bool) -> None:
+    """Check every job before any runs, run them, write everything, exit by the worst status."""
+    import json
+    import os
+
+    from simbench import results as result_files
+    from simbench.campaign import run_jobs
+    from simbench.environment import environment
+    from simbench.files import prepare_folder
+    from simbench.report.page import write_report
+    from simbench.run import stage
+
+    for job in {(j.scenario, j.system, j.seed): j for j in planned}.values():
+        stage(job)
+    prepare_folder(out)
+    with _Progress(len(planned)) as done:
+        found = run_jobs(planned, workers or os.cpu_count() or 1, done)
+    where = environment(images)
+    content = result_files.write(found, out, where)
+    command = "simbench " + " ".join(_quoted(word) for word in sys.argv[1:])
+    if images == "gl":
+        _video(found, out)
+    page = write_report(found, out, command=command, images=images, environment=where)
+    if as_json:
+        click.echo(json.dumps(content, indent=1, allow_nan=False))
+    else:
+        _print_summary(found)
+        click.echo(f"report: {page}")
+    statuses = {case.status for result in found for case in result.cases}
+    if statuses & {"bench_error", "receipt_mismatch"}:
+        raise SystemExit(BENCH_ERROR)
+    if statuses - {"ok"}:
+        raise SystemExit(FAILED)
+
+
+def _video(found: tuple[JobResult, ...], out: Path) -> None:
+    """One video: the first recording with a target, one with faults if there is one."""
+    from simbench.report.video import write_video
+
+    shown = [r for r in found if r.views and all(c.status == "ok" for c in r.cases)]
+    for result in sorted(shown, key=lambda r: len(r.faults) == 0)[:1]:
+        write_video(result, out)
+
+
+class _Progress:
+    """A bar on a terminal, plain lines on stderr otherwise."""
+
+    def __init__(self, total: int) -> None:
+        self._total, self._count = total, 0
+        self._advance: Callable[[], None] | None = None
+        self._stop: Callable[[], None] = lambda: None
+
+    def __enter__(self) -> Callable[[JobResult], None]:
+        if not sys.stderr.isatty():
+            click.echo(f"{self._total} recordings to make", err=True)
+            return self._done
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        bar = Progress(*columns, console=Console(stderr=True))
+        task = bar.add_task("recordings", total=self._total)
+        self._advance, self._stop = lambda: bar.advance(task), bar.stop
+        bar.start()
+        return self._done
+
+    def _done(self, result: JobResult) -> None:
+        self._count += 1
+        if self._advance is not None:
+            self._advance()
+            return
+        states = ", ".join(sorted({case.status for case in result.cases})) or "no pipelines"
+        click.echo(
+            f"[{self._count}/{self._total}] {result.scenario.name} {result.job.system} "
+            f"seed {result.job.seed} faults {result.faults.label}: {states} "
+            f"({sum(result.timings_s.values()):.1f} s)",
+            err=True,
+        )
+
+    def __exit__(self, *exc: object) -> None:
+        self._stop()
+
+
+def _print_summary(found: tuple[JobResult, ...]) -> None:
+    """Means over runs, one line per group and pipeline."""
+    from statistics import fmean
+
+    shown = ("tpr", "precision", "recall", "mae_m.raw", "mae_m.smooth", "coverage.smooth")
+    click.echo(f"{'':58s}" + "".join(f"{name:>16s}" for name in shown))
+    groups: dict[tuple[str, str, str, str], list[Any]] = {}
+    for result in found:
+        for case in result.cases:
+            key = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
+            groups.setdefault(key, []).append(case)
+    for key, cases in groups.items():
+        cells = []
+        for name in shown:
+            values = [r.value for c in cases for r in c.rows if r.metric == name and r.value is not None]
+            cells.append(f"{fmean(values):16.3f}" if values else f"{'-':>16s}")
+        click.echo(f"{' '.join(key):58s}" + "".join(cells))
+    bad = [(r, c) for r in found for c in r.cases if c.status != "ok"]
+    for result, case in bad:
+        click.echo(f"{case.status}: {case.pipeline}, {result.job.system} seed {result.job.seed}: {case.why}")
+
+
+def _quoted(word: str) -> str:
+    import shlex
+
+    return shlex.quote(word)
+
+
+@main.command("list")
+@click.argument(
+    "kind",
+    default="scenarios",
+    type=click.Choice(["scenarios", "rigs", "sensors", "faults", "pipelines", "metrics"]),
+)
+def list_(kind: str) -> None:
+    """List what there is: scenarios, rigs, sensors, faults, pipelines or metrics.
+
+    Example: simbench list faults
+    """
+    if kind == "pipelines":
+        from simbench.plugins import pipeline_names
+
+        lines = [(name, "") for name in pipeline_names()]
+    elif kind == "metrics":
+        from simbench.score.metrics import METRICS
+
+        lines = [(metric.name, metric.definition) for metric in METRICS]
+    elif kind == "faults":
+        from scenarios.fault_set import describe_faults
+
+        lines = [(str(f["name"]), str(f["summary"])) for f in describe_faults()]
+    elif kind == "scenarios":
+        from scenarios.load import list_scenarios, load_scenario
+
+        lines = [(name, load_scenario(name).description) for name in list_scenarios()]
+    elif kind == "rigs":
+        from scenarios.load import list_rigs, load_rig
+
+        lines = [(name, load_rig(name).description) for name in list_rigs()]
+    else:
+        from scenarios.load import list_sensors, load_sensor
+
+        lines = [(name, load_sensor(name).kind) for name in list_sensors()]
+    for name, text in lines:
+        click.echo(f"{name:28s} {text}".rstrip())
+
+
+@main.command()
+@click.argument("name")
+@click.option("--seed", type=click.IntRange(0), default=0, help="Which of the family.")
+def describe(name: str, seed: int) -> None:
+    """Print the concrete scenario of a seed, every number fixed.
+
+    Example: simbench describe overtake-approach --seed 3
+    """
+    from scenarios.describe import describe as text
+    from scenarios.load import load_scenario
+
+    click.echo(text(load_scenario(name).resolve(seed)), nl=False)
+
+
+@main.command()
+def doctor() -> None:
+    """Say what this machine offers and what is missing.
+
+    Example: simbench doctor
+    """
+    from simbench import doctor as rooms
+
+    raise SystemExit(rooms.main())
+
+
+@main.command()
+@click.option("--seeds", default="100000-100003", callback=_seeds, help="From 100000 on.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The JSON file.")
+def learn(seeds: tuple[int, ...], out: Path) -> None:
+    """Learn the shape filter's benchmark shapes from the bench (fusion/shapes.json).
+
+    Example: simbench learn --seeds 100000-100003 --out fusion/shapes.json
+    """
+    from scenarios.errors import BadInput
+    from simbench.files import write_text
+    from simbench.learn import FIRST_SEED
+    from simbench.learn import learn as learn_shapes
+
+    if min(seeds) < FIRST_SEED:
+        raise BadInput(
+            f"seed {min(seeds)} is for evaluation", field="--seeds", allowed=f"from {FIRST_SEED} on"
+        )
+    write_text(out, learn_shapes(seeds))
+    click.echo(f"wrote {out}")
+
+
+if __name__ == "__main__":
+    main()

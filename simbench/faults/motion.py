@@ -1,0 +1,229 @@
+"""motion.vibration_deg and motion.flex_deg: scripted shake of the body, and of each camera's bracket.
+
+Vibration: roll, pitch, yaw and heave of the ego's body, each a sum of sinusoids whose density is resonances
+(a second-order mode's |H|^2) over band noise falling with 1/f^2; rescaled so that this run's RMS about its
+straight-line fit is the request. Flex: roll, pitch, yaw of one bracket, one mode drawn per bracket and axis.
+Receipts: gyro (and camera heights) for the body; PnP attitude less the gyro's for the brackets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from scenarios.faults import Flex, Vibration
+from scenarios.seeding import stream
+from scenarios.severity import Profile, road_class
+from simbench.faults.estimate import (
+    BodyAttitude,
+    CameraEvidence,
+    bracket_turn_rad,
+    detrended,
+    gain,
+    lever_shift_m,
+)
+from simbench.faults.receipt import Receipt, judge, untouched
+from simbench.shake import Shake, draw_shake
+
+VIBRATION, FLEX = "motion.vibration_deg", "motion.flex_deg"
+NOTE = "camera attitude by PnP less the body's by gyro"
+TO_DEG_AND_M = np.array([np.rad2deg(1.0)] * 3 + [1.0])
+LINES = 64  # sinusoids per axis
+# Modes per axis (roll, pitch, yaw, heave): (frequency Hz, damping ratio, share of the power). Car: sprung-
+# mass modes and wheel hop, so that rate RMS / angle RMS is about 8 1/s as computed for road classes A-E;
+# rider: torso sway below 1.5 Hz and a little of the deck's 4-20 Hz [judgement].
+MODES: Mapping[str, tuple[tuple[tuple[float, float, float], ...], ...]] = {
+    "car": (
+        ((1.5, 0.25, 0.99), (11.0, 0.10, 0.01)),
+        ((1.3, 0.25, 0.99), (11.0, 0.10, 0.01)),
+        ((0.9, 0.30, 1.00),),
+        ((1.3, 0.25, 0.98), (11.0, 0.10, 0.02)),
+    ),
+    "rider": (
+        ((0.6, 0.25, 0.97), (7.0, 0.20, 0.03)),
+        ((0.8, 0.25, 0.97), (8.0, 0.20, 0.03)),
+        ((0.5, 0.25, 0.98), (5.0, 0.20, 0.02)),
+        ((1.5, 0.25, 0.95), (8.0, 0.20, 0.05)),
+    ),
+}
+BAND_HZ: Mapping[str, tuple[float, float]] = {"car": (0.5, 20.0), "rider": (0.3, 20.0)}
+BAND_NOISE_SHARE = 0.03
+
+
+def describe_shake(shake: Shake, profile: Profile, duration_s: float) -> str:
+    """One sentence on what a body shake is in the world: size, rate, band and the road that gives it."""
+    rms, rate = np.rad2deg(shake.rms(duration_s)), np.rad2deg(shake.rate_rms(duration_s))
+    low, high = BAND_HZ[profile]
+    road = road_class(float(rms[1]), profile)
+    source = road if road.startswith("beyond") else f"ISO 8608 road class {road} on this vehicle"
+    return (
+        f"pitch {rms[1]:.2f} deg RMS ({rate[1]:.1f} deg/s), roll {rms[0]:.2f}, yaw {rms[2]:.2f} deg, heave "
+        f"{shake.rms(duration_s)[3] * 1e3:.0f} mm, {low:g}-{high:g} Hz: {source}"
+    )
+
+
+def _mode(
+    frequency_hz: Float64[np.ndarray, " k"], mode: tuple[float, float, float]
+) -> Float64[np.ndarray, " k"]:
+    natural, damping, share = mode
+    ratio = frequency_hz / natural
+    response = 1.0 / ((1.0 - ratio**2) ** 2 + (2.0 * damping * ratio) ** 2)
+    density: np.ndarray = share * response / np.trapezoid(response, frequency_hz)
+    return density
+
+
+def body_shake(spec: Vibration, profile: Profile, duration_s: float, seed: int) -> Shake:
+    """(roll, pitch, yaw in rad, heave in m) of the body. `profile`: car or rider."""
+    low, high = BAND_HZ[profile]
+    rng = stream(seed, "fault", VIBRATION)
+    edges = np.geomspace(low, high, LINES + 1)
+    frequency = edges[:-1] + np.diff(edges) * rng.uniform(0.0, 1.0, LINES)
+    noise = frequency**-2.0
+    noise = noise / np.trapezoid(noise, frequency)
+    density = np.stack(
+        [
+            (1.0 - BAND_NOISE_SHARE) * sum(_mode(frequency, m) for m in modes) + BAND_NOISE_SHARE * noise
+            for modes in MODES[profile]
+        ]
+    )
+    return draw_shake(rng, frequency, density, requested_rms(spec), duration_s)
+
+
+def requested_rms(spec: Vibration) -> Float64[np.ndarray, "4"]:
+    """RMS of roll, pitch, yaw in rad and heave in m."""
+    pitch = np.deg2rad(spec.rms_deg)
+    heave = spec.rms_deg * spec.heave_m_per_deg
+    return np.array([pitch * spec.roll_ratio, pitch, pitch * spec.yaw_ratio, heave])
+
+
+def bracket_shake(spec: Flex, camera: str, duration_s: float, seed: int) -> Shake:
+    """(roll, pitch, yaw in rad) of one camera's bracket."""
+    low, high = {"stiff": (20.0, 60.0), "soft": (8.0, 20.0)}[spec.stiffness]
+    rng = stream(seed, "fault", FLEX, camera)
+    edges = np.geomspace(0.5 * low, 2.0 * high, LINES + 1)
+    frequency = edges[:-1] + np.diff(edges) * rng.uniform(0.0, 1.0, LINES)
+    density = np.stack([_mode(frequency, (rng.uniform(low, high), 0.05, 1.0)) for _ in range(3)])
+    return draw_shake(rng, frequency, density, np.full(3, np.deg2rad(spec.rms_deg)), duration_s)
+
+
+def vibration_receipts(
+    spec: Vibration,
+    realised: Shake | None,
+    duration_s: float,
+    body: BodyAttitude | None,
+    evidence: Sequence[CameraEvidence],
+) -> tuple[Receipt, ...]:
+    """Roll, pitch and yaw by the integrated gyro; heave, which no gyro sees, by the cameras' height (PnP)
+    less what their lever arm explains. Each is how often the drawn shake is contained in what was measured,
+    times its RMS: signed, and near 0 when something else shook.
+    """
+    asked = requested_rms(spec) * TO_DEG_AND_M
+    drawn = np.zeros(4) if realised is None else realised.rms(duration_s) * TO_DEG_AND_M
+    found: list[tuple[float | None, float]] = [(None, 0.0)] * 4
+    if body is not None:
+        inside = body.stamp_ns < duration_s * 1e9
+        signal = detrended(_at(realised, body.stamp_ns[inside])[:, :3])
+        angle = detrended(body.angle_rad[inside])
+        for axis in range(3):
+            # Gyro noise, its sampling, and what is left of turns about three axes not commuting.
+            worst = float(np.deg2rad(drawn[:3].max()))
+            left = np.rad2deg(0.05 * worst**2 + 0.1 * worst**3)
+            sd = np.rad2deg(body.sd_rad) / np.sqrt(3.0) + 0.004 * drawn[axis] + left
+            found[axis] = _contained(angle[:, axis], signal[:, axis], drawn[axis], TO_DEG_AND_M[axis]), sd
+    if evidence:
+        height = np.concatenate([detrended(e.shift_m[:, 2:] - lever_shift_m(e)[:, 2:]) for e in evidence])
+        signal = np.concatenate([detrended(_at(realised, e.taken_ns)[:, 3:]) for e in evidence])
+        found[3] = _contained(height, signal, drawn[3], 1.0), _heave_sd_m(evidence, body)
+    return tuple(
+        judge(
+            fault=VIBRATION,
+            quantity=f"{name} RMS",
+            unit="m" if name == "heave" else "deg",
+            requested=float(asked[axis]),
+            realised=float(drawn[axis]),
+            measured=found[axis][0],
+            estimator_sd=float(found[axis][1]),
+            allowed=0.01 * float(asked[axis]),
+            note="camera heights by PnP" if name == "heave" else "integrated gyro",
+        )
+        for axis, name in enumerate(("roll", "pitch", "yaw", "heave"))
+        if asked[axis] > 0.0
+    )
+
+
+def _at(shake: Shake | None, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 4"]:
+    return np.zeros((len(t_ns), 4)) if shake is None else shake.at(t_ns)
+
+
+def _contained(found: np.ndarray, drawn: np.ndarray, rms: float, scale: float) -> float:
+    """The RMS of what is found along the drawn signal, signed; of all that is found where nothing was
+    drawn.
+    """
+    if rms == 0.0 or not np.any(drawn):
+        return scale * float(np.std(found))
+    return rms * gain(found, drawn)
+
+
+def _heave_sd_m(evidence: Sequence[CameraEvidence], body: BodyAttitude | None) -> float:
+    """A bracket that bends is taken for a turn of the body: its bending times the lever arm, over all
+    frames.
+    """
+    floor_m = 1e-4
+    errors = []
+    for item in evidence:
+        bending = item.turn_rad if body is None else bracket_turn_rad(item, body)
+        arm_m = float(np.linalg.norm((item.position_ego_m - item.pivot_ego_m)[:2]))
+        errors.append(arm_m * float(detrended(bending).std(axis=0).max()))
+    return floor_m + float(np.sqrt(np.mean(np.square(errors)) / sum(e.frames for e in evidence)))
+
+
+def flex_receipts(
+    spec: Flex,
+    cameras: Sequence[str],
+    realised: Mapping[str, Shake],
+    duration_s: float,
+    evidence: Sequence[CameraEvidence],
+    body: BodyAttitude | None,
+) -> tuple[Receipt, ...]:
+    """Per struck camera: how often the drawn bending is contained in its attitude (PnP) against the body's
+    (gyro), times its RMS over all axes. Where the fault names cameras: that the others do not bend.
+    """
+    result: list[Receipt] = []
+    others: list[tuple[float, float]] = []
+    for item in evidence:
+        bending = detrended(item.turn_rad if body is None else bracket_turn_rad(item, body))
+        # What the gyro leaves of the body's shake: it is sampled, and turns about several axes do not
+        # commute.
+        left = 0.02 * float(bending.std()) if body is None else body.rms_rad * (0.005 + 0.5 * body.rms_rad)
+        left_deg = float(np.rad2deg(left + (0.0 if body is None else body.sd_rad)))
+        if item.camera not in cameras:
+            others.append((float(np.rad2deg(np.std(bending))), 0.002 + left_deg))
+            continue
+        shake = realised.get(item.camera)
+        rms = 0.0 if shake is None else float(np.rad2deg(np.sqrt(np.mean(shake.rms(duration_s) ** 2))))
+        drawn = np.zeros_like(bending) if shake is None else detrended(shake.at(item.taken_ns))
+        result.append(
+            judge(
+                fault=FLEX,
+                quantity=f"{item.camera} bracket RMS",
+                unit="deg",
+                requested=spec.rms_deg,
+                realised=rms,
+                measured=_contained(bending, drawn, rms, float(np.rad2deg(1.0))),
+                # Large turns about three axes do not commute.
+                estimator_sd=0.001 + left_deg / np.sqrt(item.frames) + 0.1 * float(np.deg2rad(rms)) * rms,
+                allowed=0.01 * spec.rms_deg,
+                note=NOTE,
+            )
+        )
+    if others:
+        worst, sd_deg = max(others)
+        result.append(
+            untouched(
+                fault=FLEX, quantity="bending of the other cameras", unit="deg", worst=worst,
+                estimator_sd=sd_deg, note=NOTE,
+            )
+        )  # fmt: skip
+    return tuple(result)

@@ -1,0 +1,95 @@
+"""A receipt: what was asked for, what this seed drew, and what an independent estimator finds in the data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Literal
+
+Status = Literal["ok", "mismatch", "unverifiable"]
+OK: Final = "ok"
+MISMATCH: Final = "mismatch"
+UNVERIFIABLE: Final = "unverifiable"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Receipt:
+    """requested, realised, measured in `unit`. `estimator_sd`: 1 SD of the measurement about the realised
+    value.
+
+    status is `mismatch` unless |measured - realised| <= 5 SD and |realised - requested| <= allowed; else
+    `unverifiable` when the effect is below `smallest` (what the estimator can detect) or the data allow no
+    estimate (`measured` is None); else `ok`.
+    """
+
+    fault: str
+    quantity: str
+    unit: str
+    requested: float
+    realised: float
+    measured: float | None
+    estimator_sd: float
+    allowed: float
+    smallest: float
+    note: str
+    status: Status
+
+
+def judge(
+    *,
+    fault: str,
+    quantity: str,
+    unit: str,
+    requested: float,
+    realised: float,
+    measured: float | None,
+    estimator_sd: float,
+    allowed: float,
+    note: str = "",
+) -> Receipt:
+    """Fill in the verdict. The smallest detectable effect is 5 SD of the estimator: below it, a fault that
+    was switched off could not be told from one that acts. Numbers that are not finite are a mismatch.
+    """
+    smallest = 5.0 * float(estimator_sd)
+    drawn_as_asked = abs(realised - requested) <= allowed
+    status: Status
+    if not drawn_as_asked or (measured is not None and not abs(measured - realised) <= smallest):
+        status = MISMATCH
+    elif measured is None or abs(realised) <= smallest:
+        status = UNVERIFIABLE
+    else:
+        status = OK
+    return Receipt(
+        fault=fault,
+        quantity=quantity,
+        unit=unit,
+        requested=requested,
+        realised=realised,
+        measured=None if measured is None else float(measured),
+        estimator_sd=float(estimator_sd),
+        allowed=float(allowed),
+        smallest=smallest,
+        note=note,
+        status=status,
+    )
+
+
+def untouched(
+    *, fault: str, quantity: str, unit: str, worst: float, estimator_sd: float, note: str
+) -> Receipt:
+    """What a fault must leave alone: `worst` is the largest effect found there. `ok` within 5 SD of
+    nothing.
+    """
+    smallest = 5.0 * estimator_sd
+    return Receipt(
+        fault=fault,
+        quantity=quantity,
+        unit=unit,
+        requested=0.0,
+        realised=0.0,
+        measured=worst,
+        estimator_sd=estimator_sd,
+        allowed=0.0,
+        smallest=smallest,
+        note=note,
+        status=OK if abs(worst) <= smallest else MISMATCH,
+    )

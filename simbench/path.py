@@ -1,0 +1,94 @@
+"""Where a scripted actor is at any time: a path in the plane at a piecewise linear speed, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+from scipy.interpolate import CubicSpline
+
+from scenarios.scenario import Path
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Track:
+    """A drive. `at` gives pose and motion at true times t_ns [n]; past either end it goes on straight."""
+
+    knot_s: Float64[np.ndarray, " k"]  # arc length table, m
+    knot_xy_m: Float64[np.ndarray, "k 2"]
+    knot_heading_rad: Float64[np.ndarray, " k"]
+    speed_t_s: Float64[np.ndarray, " v"]
+    speed_mps: Float64[np.ndarray, " v"]
+
+    def arc_m(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+        """Distance driven since t = 0 (negative before), the exact integral of the speed profile."""
+        t = np.asarray(t_ns, dtype=np.float64) * 1e-9
+        knots, speed = self.speed_t_s, self.speed_mps
+        # Constant speed outside the profile, linear inside: integrate per segment from t = 0.
+        driven: np.ndarray = _integral(t, knots, speed) - _integral(np.zeros(1), knots, speed)
+        return driven
+
+    def speed_at(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+        """Speed along the path in m/s."""
+        t_s = np.asarray(t_ns, dtype=np.float64) * 1e-9
+        speed: np.ndarray = np.interp(t_s, self.speed_t_s, self.speed_mps)
+        return speed
+
+    def at(
+        self, t_ns: Int64[np.ndarray, " n"]
+    ) -> tuple[Float64[np.ndarray, "n 2"], Float64[np.ndarray, " n"]]:
+        """Position [n 2] in metres and heading [n] in radians in the world."""
+        s = self.arc_m(t_ns)
+        inside = np.clip(s, self.knot_s[0], self.knot_s[-1])
+        heading = np.interp(inside, self.knot_s, self.knot_heading_rad)
+        xy = np.stack([np.interp(inside, self.knot_s, self.knot_xy_m[:, i]) for i in range(2)], axis=1)
+        beyond = (s - inside)[:, None]
+        return xy + beyond * np.stack([np.cos(heading), np.sin(heading)], axis=1), heading
+
+
+def _integral(
+    t: Float64[np.ndarray, " n"], knots: Float64[np.ndarray, " v"], speed: Float64[np.ndarray, " v"]
+) -> Float64[np.ndarray, " n"]:
+    """Integral of the speed from knots[0] to t, with the end values held outside."""
+    area = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(knots))])
+    inside = np.clip(t, knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, max(len(knots) - 2, 0))
+    dt = inside - knots[i]
+    here = np.interp(inside, knots, speed)
+    within = area[i] + 0.5 * (speed[i] + here) * dt
+    before = np.minimum(t - knots[0], 0.0) * speed[0]
+    after = np.maximum(t - knots[-1], 0.0) * speed[-1]
+    whole: np.ndarray = within + before + after
+    return whole
+
+
+def make_track(path: Path) -> Track:
+    """The track of a declared path. Two waypoints are exact; more are a C2 spline tabled every 2 cm."""
+    points = np.asarray(path.waypoints_m, dtype=np.float64)
+    if isinstance(path.speed_mps, tuple):
+        profile = np.asarray(path.speed_mps, dtype=np.float64)
+    else:
+        profile = np.array([[0.0, path.speed_mps]], dtype=np.float64)
+    if len(points) == 1:
+        heading = np.array([np.deg2rad(path.heading_deg)])
+        table_s, table_xy = np.zeros(1), points
+    elif len(points) == 2:
+        step = points[1] - points[0]
+        heading = np.full(2, np.arctan2(step[1], step[0]))
+        table_s, table_xy = np.array([0.0, np.hypot(*step)]), points
+    else:
+        chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        spline = CubicSpline(chord, points)
+        u = np.linspace(0.0, chord[-1], max(int(chord[-1] / 0.02), 2))
+        table_xy = spline(u)
+        tangent = spline(u, 1)
+        table_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(table_xy, axis=0).T))])
+        heading = np.unwrap(np.arctan2(tangent[:, 1], tangent[:, 0]))
+    return Track(
+        knot_s=table_s,
+        knot_xy_m=table_xy,
+        knot_heading_rad=heading,
+        speed_t_s=profile[:, 0],
+        speed_mps=profile[:, 1],
+    )

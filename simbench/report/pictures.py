@@ -1,0 +1,159 @@
+"""Instants of a job again: the same world, motion and scans, since all of it follows from the job."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import UInt8
+
+from fusion.aoi import AoiConfig, clip, enlarge, map_into_boxes
+from fusion.camera import PinholeCamera
+from fusion.clustering import ClusteringConfig
+from fusion.explain import AoiExplanation, explain_aoi
+from fusion.ground import GroundConfig, remove_ground
+from fusion.localize import planar_distance_m
+from fusion.messages import CategorySize, Detection, LidarScan
+from fusion.shape import BenchmarkShapes, ShapeConfig
+from fusion.timing import StepClock
+from scenarios.seeding import stream
+from simbench.capture import Drawn, draw, set_in_motion
+from simbench.exhibit import PairView
+from simbench.motion import Motion, at
+from simbench.plugins import load_pipeline
+from simbench.run import CATEGORIES, Job, Stage, stage
+from simbench.sensors import lidar
+from simbench.sensors.render import Renderer
+
+LARGEST_PX = 2048  # of the renderer's buffer
+
+
+class Replay:
+    """A job's world in the job's motion. Raises BadInput where the job's scenario is not there any more."""
+
+    def __init__(self, job: Job) -> None:
+        self.staged: Stage = stage(job)
+        rig, system = self.staged.rig, self.staged.system
+        timing = {name: rig.timing(name, system.duration_s, job.seed) for name in rig.cameras}
+        self.seed = job.seed
+        self.drawn: Drawn = draw(
+            rig, self.staged.world, self.staged.faults, timing, system.duration_s, job.seed
+        )
+        self.motion: Motion = set_in_motion(self.staged.world, rig, system.ego, self.drawn)
+
+    def scan(self, seq: int) -> LidarScan:
+        """Scan `seq` exactly as it was delivered."""
+        rig = self.staged.rig
+        rng = stream(self.seed, "lidar", rig.lidar_name, str(seq))
+        start_ns = seq * lidar.period_ns(rig.lidar)
+        return lidar.sweep(rig.lidar_name, rig.lidar, self.motion, start_ns, seq, rng)[0]
+
+    @contextmanager
+    def camera(self, sharper: int = 1) -> Iterator[Taker]:
+        """Takes pictures while open. `sharper`: how many pixels of the picture lie along one of the camera's,
+        less where the renderer's buffer would not hold them. Raises gl.RenderingUnavailable."""
+        with Renderer(self.staged.world) as renderer:
+            yield Taker(self, renderer, sharper)
+
+
+class Taker:
+    """Pictures of a replay."""
+
+    def __init__(self, replay: Replay, renderer: Renderer, sharper: int) -> None:
+        self._replay, self._renderer, self._sharper = replay, renderer, sharper
+
+    def take(self, camera: str, capture_ns: int) -> UInt8[np.ndarray, "h w 3"]:
+        """What the camera sees at a true time."""
+        replay = self._replay
+        pinhole = replay.staged.rig.pinholes[camera]
+        pose = at(replay.motion.sensor(camera, np.array([capture_ns], dtype=np.int64)))
+        return self._renderer.rgb(replay.motion, capture_ns, pose, magnified(pinhole, self._sharper))
+
+
+def magnified(camera: PinholeCamera, sharper: int) -> PinholeCamera:
+    """The same view with more pixels, as far as the buffer goes."""
+    factor = max(1, min(sharper, LARGEST_PX // max(camera.width_px, camera.height_px)))
+    return replace(
+        camera,
+        fx_px=camera.fx_px * factor,
+        fy_px=camera.fy_px * factor,
+        cx_px=camera.cx_px * factor,
+        cy_px=camera.cy_px * factor,
+        width_px=camera.width_px * factor,
+        height_px=camera.height_px * factor,
+    )
+
+
+def take_pictures(
+    replay: Replay, wanted: Sequence[tuple[str, int]], sharper: int = 1
+) -> dict[tuple[str, int], UInt8[np.ndarray, "h w 3"]]:
+    """Pictures for a list of (camera, capture_ns)."""
+    with replay.camera(sharper) as taker:
+        return {key: taker.take(*key) for key in dict.fromkeys(wanted)}
+
+
+# -- steps 1 to 4 of one instant ------------------------------------------------------------------------
+
+
+@runtime_checkable
+class _CategoryConfig(Protocol):
+    @property
+    def granularity_m(self) -> float: ...
+
+    @property
+    def min_points(self) -> int: ...
+
+
+@runtime_checkable
+class _Config(Protocol):
+    ground: GroundConfig
+    aoi: AoiConfig
+    clustering: ClusteringConfig
+    shape: ShapeConfig
+
+    def of(self, category: str, sizes: dict[str, CategorySize]) -> _CategoryConfig: ...
+
+
+@runtime_checkable
+class SixSteps(Protocol):
+    """A pipeline that tells its hyper-parameters and shapes, so that its steps can be shown."""
+
+    config: _Config
+    shapes: BenchmarkShapes
+
+
+def explain_view(replay: Replay, view: PairView, pipeline: str) -> AoiExplanation | None:
+    """Steps 1 to 4 on the target's delivered box. None without a box, or where the pipeline
+    has not the six steps."""
+    steps = load_pipeline(pipeline)()
+    target = replay.staged.system.target
+    if not isinstance(steps, SixSteps) or view.box_px is None or target is None:
+        return None
+    config, told, category = steps.config, replay.drawn.told, replay.staged.system.actors[target].category
+    camera = told.cameras[view.camera]
+    aoi_px = clip(enlarge(view.box_px, config.aoi), camera)
+    if aoi_px is None:
+        return None
+    scan = replay.scan(view.scan_seq)
+    kept = np.flatnonzero(remove_ground(scan.xyz_m, told.T_ego_sensor[scan.sensor], config.ground).keep)
+    T_camera_lidar = told.T_camera_lidar(view.camera, scan.sensor)
+    (inside,) = map_into_boxes(np.ascontiguousarray(scan.xyz_m[kept].T), T_camera_lidar, camera, [aoi_px])
+    points = kept[inside.points]
+    entry = config.of(category, dict(CATEGORIES))
+    return explain_aoi(
+        camera=view.camera,
+        detection=Detection(track_id=0, category=category, box_px=view.box_px, confidence=1.0),
+        aoi_px=aoi_px,
+        points=points,
+        uv_px=inside.uv_px,
+        distance_m=planar_distance_m(scan.xyz_m[points]),
+        granularity_m=entry.granularity_m,
+        min_points=entry.min_points,
+        benchmark=steps.shapes.of(category),
+        clustering=config.clustering,
+        shape=config.shape,
+        clock=StepClock(("clustering", "shape")),
+    )

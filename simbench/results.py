@@ -1,0 +1,171 @@
+"""`result.json`: rows, cases, summary, timings and environment of a run, as `docs/results.md` describes
+them.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import hashlib
+import io
+import json
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scenarios.describe import describe
+from scenarios.seeding import stream
+from simbench.files import write_text
+from simbench.run import ORACLE, Case, Job, JobResult
+from simbench.score.metrics import METRICS
+from simbench.score.statistics import summarize
+
+SCHEMA = "simbench-result/1"
+
+
+def document(results: Sequence[JobResult], environment: Mapping[str, object]) -> dict[str, Any]:
+    """The whole of `result.json`. Same inputs, same content, but for `timings` and `environment`."""
+    return {
+        "schema": SCHEMA,
+        "rows": [row for result in results for case in result.cases for row in _rows(result, case)],
+        "cases": [_case(result, case) for result in results for case in result.cases],
+        "summary": _summary(results),
+        "timings": [row for result in results for case in result.cases for row in _timings(result, case)],
+        "environment": dict(environment),
+    }
+
+
+def write(results: Sequence[JobResult], out: Path, environment: Mapping[str, object]) -> dict[str, Any]:
+    """Write result.json, pairs.csv, frames.csv and the resolved scenarios into `out`."""
+    content = document(results, environment)
+    write_text(out / "result.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    write_text(out / "pairs.csv", _table(results, "pairs"))
+    write_text(out / "frames.csv", _table(results, "frames"))
+    for result in results:
+        name = f"scenario-{result.scenario.name}-{result.job.seed}.yaml"
+        write_text(out / name, describe(result.scenario))
+    return content
+
+
+def reproduce(job: Job, pipelines: Iterable[str]) -> str:
+    """The command that makes this case again."""
+    words = ["simbench", "run", job.scenario, "--system", job.system]
+    for name in pipelines:
+        words += ["--pipeline", name]
+    words += ["--seeds", str(job.seed)]
+    for text in job.faults:
+        words += ["--faults", text]
+    if job.size_px is not None:
+        words += ["--size", f"{job.size_px[0]}x{job.size_px[1]}"]
+    return shlex.join([*words, "--images", job.images])
+
+
+def scenario_hash(result: JobResult) -> str:
+    """SHA-256 of the concrete scenario's text and its faults."""
+    text = describe(result.scenario) + json.dumps(result.faults.as_data(), sort_keys=True)
+    return hashlib.sha256(text.encode("utf-8")).hexdigest()
+
+
+def _key(result: JobResult, case: Case) -> dict[str, Any]:
+    return {
+        "scenario": result.scenario.name,
+        "system": result.job.system,
+        "pipeline": case.pipeline,
+        "seed": result.job.seed,
+        "faults": result.faults.label,
+    }
+
+
+def _rows(result: JobResult, case: Case) -> Iterable[dict[str, Any]]:
+    for row in case.rows:
+        entry = {**_key(result, case), "metric": row.metric, "value": row.value, "unit": row.unit}
+        entry |= {"better": row.better, "n": row.n, "sd": row.sd}
+        yield entry if row.value is not None else {**entry, "why": row.why}
+
+
+def _case(result: JobResult, case: Case) -> dict[str, Any]:
+    pipelines = result.job.pipelines if case.pipeline == ORACLE else (case.pipeline,)
+    return {
+        **_key(result, case),
+        "status": case.status,
+        "why": case.why,
+        "scenario_sha256": scenario_hash(result),
+        "fault_specs": result.faults.as_data(),
+        "shake": result.shake,
+        "receipts": [dataclasses.asdict(receipt) for receipt in result.receipts],
+        "command": reproduce(result.job, pipelines),
+    }
+
+
+def _summary(results: Sequence[JobResult]) -> list[dict[str, Any]]:
+    groups: dict[tuple[str, str, str, str], list[tuple[int, Case]]] = {}
+    for result in results:
+        for case in result.cases:
+            key = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
+            groups.setdefault(key, []).append((result.job.seed, case))
+    content = []
+    for (scenario, system, faults, pipeline), members in groups.items():
+        for metric in METRICS:
+            values = {
+                seed: next((r.value for r in case.rows if r.metric == metric.name), None)
+                for seed, case in members
+            }
+            rng = stream(0, "summary", scenario, system, faults, pipeline, metric.name)
+            summary = summarize(values, rng)
+            content.append(
+                {
+                    "scenario": scenario,
+                    "system": system,
+                    "faults": faults,
+                    "pipeline": pipeline,
+                    "metric": metric.name,
+                    "unit": metric.unit,
+                    "better": metric.better,
+                    **dataclasses.asdict(summary),
+                }
+            )
+    return content
+
+
+def latency_ms(case: Case) -> dict[str, tuple[float, int]]:
+    """`latency_ms.p50`, `.p99` per scan and `.<step>.p50`, each with its count. The first scan warms up."""
+    if case.driven is None or len(case.driven.scan_ms) < 2:
+        return {}
+    scans = np.array(case.driven.scan_ms[1:])
+    values = {f"latency_ms.p{q}": (float(np.percentile(scans, q)), len(scans)) for q in (50, 99)}
+    for step, spent_ns in case.driven.step_ns.items():
+        if spent_ns:
+            values[f"latency_ms.{step}.p50"] = (float(np.median(spent_ns)) * 1e-6, len(spent_ns))
+    return values
+
+
+def _timings(result: JobResult, case: Case) -> Iterable[dict[str, Any]]:
+    for metric, (value, n) in latency_ms(case).items():
+        yield {
+            **_key(result, case), "metric": metric, "value": value, "unit": "ms", "better": "lower", "n": n,
+        }  # fmt: skip
+
+
+def _table(results: Sequence[JobResult], what: str) -> str:
+    """Per-pair or per-frame values of every case as CSV."""
+    lines: list[dict[str, Any]] = []
+    for result in results:
+        for case in result.cases:
+            for item in getattr(case.scores, what, ()) if case.scores is not None else ():
+                values = dataclasses.asdict(item)
+                lines.append({**_key(result, case), **{k: _flat(v) for k, v in values.items()}})
+    text = io.StringIO()
+    if lines:
+        writer = csv.DictWriter(text, fieldnames=list(lines[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(lines)
+    return text.getvalue()
+
+
+def _flat(value: Any) -> Any:
+    if isinstance(value, dict | tuple | list):
+        return json.dumps(value)
+    return value
