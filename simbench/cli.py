@@ -147,20 +147,25 @@ def demo(
     "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE",
     help="Replaces the scenario's same fault, adds the others; 'none' clears. May be repeated.",
 )  # fmt: skip
+@click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
 @_common("out/run")
 def run(
-    targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
+    targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...], alone: bool,
     seeds: tuple[int, ...], images: str, jobs: int | None, out: Path, as_json: bool,
     size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
     """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
 
+    Where errors are injected, the same drives are also run with errors off.
+
     Example: simbench run overtake-approach --system car --faults timing.trigger_offset_ms=50 --seeds 0-1
     """
+    from dataclasses import replace
+
     from scenarios.fault_set import parse_fault_arguments
     from scenarios.load import load_scenario
     from simbench.plugins import load_pipeline
-    from simbench.run import Job
+    from simbench.run import Job, effective_faults
 
     if not targets:
         click.echo("simbench: nothing selected: name at least one scenario (see 'simbench list').", err=True)
@@ -172,15 +177,16 @@ def run(
     planned = []
     for target in targets:
         family = load_scenario(target)
-        systems = family.system_names if system == "both" else (system,)
-        planned += [
-            Job(
-                scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
-                images="gl" if images == "gl" else "none", size_px=size,
-            )
-            for name in systems
-            for seed in seeds
-        ]  # fmt: skip
+        for name in family.system_names if system == "both" else (system,):
+            for seed in seeds:
+                job = Job(
+                    scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
+                    images="gl" if images == "gl" else "none", size_px=size,
+                )  # fmt: skip
+                # The same drive with errors off: what every loss is measured against.
+                if not alone and len(effective_faults(job)) > 0:
+                    planned.append(replace(job, faults=("none",), images="none"))
+                planned.append(job)
     _execute(planned, out, images, jobs, as_json)
 
 
@@ -196,8 +202,8 @@ def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as
     from simbench.report.page import write_report
     from simbench.run import stage
 
-    for job in {(j.scenario, j.system, j.seed): j for j in planned}.values():
-        stage(job)
+    for job in {(j.scenario, j.system): j for j in reversed(planned)}.values():
+        stage(job)  # bad input shows before anything runs
     prepare_folder(out)
     with _Progress(len(planned)) as done:
         found = run_jobs(planned, workers or os.cpu_count() or 1, done)
@@ -272,18 +278,19 @@ def _print_summary(found: tuple[JobResult, ...]) -> None:
     from statistics import fmean
 
     shown = ("tpr", "precision", "recall", "mae_m.raw", "mae_m.smooth", "coverage.smooth")
-    click.echo(f"{'':58s}" + "".join(f"{name:>16s}" for name in shown))
-    groups: dict[tuple[str, str, str, str], list[Any]] = {}
+    groups: dict[str, list[Any]] = {}
     for result in found:
         for case in result.cases:
-            key = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
-            groups.setdefault(key, []).append(case)
+            words = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
+            groups.setdefault(" ".join(words), []).append(case)
+    width = max((len(name) for name in groups), default=0) + 2
+    click.echo(" " * width + "".join(f"{name:>16s}" for name in shown))
     for key, cases in groups.items():
         cells = []
         for name in shown:
             values = [r.value for c in cases for r in c.rows if r.metric == name and r.value is not None]
             cells.append(f"{fmean(values):16.3f}" if values else f"{'-':>16s}")
-        click.echo(f"{' '.join(key):58s}" + "".join(cells))
+        click.echo(f"{key:{width}s}" + "".join(cells))
     bad = [(r, c) for r in found for c in r.cases if c.status != "ok"]
     for result, case in bad:
         click.echo(f"{case.status}: {case.pipeline}, {result.job.system} seed {result.job.seed}: {case.why}")

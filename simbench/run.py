@@ -89,14 +89,19 @@ class Stage:
     world: World
 
 
+def effective_faults(job: Job) -> FaultSet:
+    """The scenario's own faults with the job's on top."""
+    family = load_scenario(job.scenario)
+    own = family.fault_set(family.resolve(job.seed))
+    return own.override(parse_fault_arguments(job.faults)) if job.faults else own
+
+
 def stage(job: Job) -> Stage:
     """Resolve scenario, faults and rig of a job and build its world. Raises BadInput."""
     family = load_scenario(job.scenario)
     scenario = family.resolve(job.seed)
     system = family.system(job.system, seed=job.seed)
-    faults = family.fault_set(scenario)
-    if job.faults:
-        faults = faults.override(parse_fault_arguments(job.faults))
+    faults = effective_faults(job)
     declared = family.rig(system.rig)
     rig = assemble(declared, rig_sensors(declared, family.beside))
     if job.size_px is not None:
