@@ -58,6 +58,8 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
     words += ["--seeds", str(job.seed)]
     for text in job.faults:
         words += ["--faults", text]
+    if job.faults != ("none",):
+        words.append("--alone")  # this case only, not the same drive with errors off
     if job.size_px is not None:
         words += ["--size", f"{job.size_px[0]}x{job.size_px[1]}"]
     return shlex.join([*words, "--images", job.images])

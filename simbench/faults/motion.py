@@ -127,9 +127,10 @@ def vibration_receipts(
         signal = detrended(_at(realised, body.stamp_ns[inside])[:, :3])
         angle = detrended(body.angle_rad[inside])
         for axis in range(3):
-            # Gyro noise, its sampling, and what is left of turns about three axes not commuting.
+            # Gyro noise, its sampling, and what is left of turns about three axes not commuting: no gyro sees
+            # the mean of the shake over the run, which is the larger the shorter the run.
             worst = float(np.deg2rad(drawn[:3].max()))
-            left = np.rad2deg(0.05 * worst**2 + 0.1 * worst**3)
+            left = np.rad2deg(0.5 / duration_s * worst**2 + 0.1 * worst**3)
             sd = np.rad2deg(body.sd_rad) / np.sqrt(3.0) + 0.004 * drawn[axis] + left
             found[axis] = _contained(angle[:, axis], signal[:, axis], drawn[axis], TO_DEG_AND_M[axis]), sd
     if evidence:
