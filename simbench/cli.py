@@ -62,7 +62,8 @@ def _seeds(_: click.Context, __: click.Parameter, text: str) -> tuple[int, ...]:
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")
-        if not first.isdigit() or (dash and not last.isdigit()):
+        numbers = (first, last) if dash else (first,)
+        if not all(word.isascii() and word.isdigit() and len(word) < 19 for word in numbers):
             raise click.BadParameter(f"'{text}' is not a list of seeds; allowed: 0-3 or 0,2,5")
         low, high = int(first), int(last) if dash else int(first)
         if high < low or high - low >= 100_000:
@@ -75,7 +76,7 @@ def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int,
     if text is None:
         return None
     width, cross, height = text.partition("x")
-    if not cross or not width.isdigit() or not height.isdigit():
+    if not cross or not (width + height).isascii() or not width.isdigit() or not height.isdigit():
         raise click.BadParameter(f"'{text}' is not an image size; allowed: 960x600")
     if not (64 <= int(width) <= 2048 and 64 <= int(height) <= 2048):
         raise click.BadParameter(f"'{text}' is out of range; allowed: 64x64 to 2048x2048")
@@ -175,7 +176,7 @@ def run(
         load_pipeline(name)
     parse_fault_arguments(faults)
     planned = []
-    for target in targets:
+    for target in dict.fromkeys(targets):
         family = load_scenario(target)
         for name in family.system_names if system == "both" else (system,):
             for seed in seeds:
@@ -202,7 +203,10 @@ def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as
     from simbench.report.page import write_report
     from simbench.run import stage
 
-    for job in {(j.scenario, j.system): j for j in reversed(planned)}.values():
+    first: dict[tuple[str, str, tuple[str, ...]], Job] = {}
+    for job in planned:
+        first.setdefault((job.scenario, job.system, job.faults), job)
+    for job in first.values():
         stage(job)  # bad input shows before anything runs
     prepare_folder(out)
     with _Progress(len(planned)) as done:
@@ -375,7 +379,7 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
     Example: simbench learn --seeds 100000-100003 --out fusion/shapes.json
     """
     from scenarios.errors import BadInput
-    from simbench.files import write_text
+    from simbench.files import prepare_folder, write_text
     from simbench.learn import FIRST_SEED
     from simbench.learn import learn as learn_shapes
 
@@ -383,6 +387,7 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
         raise BadInput(
             f"seed {min(seeds)} is for evaluation", field="--seeds", allowed=f"from {FIRST_SEED} on"
         )
+    prepare_folder(out.parent)
     write_text(out, learn_shapes(seeds))
     click.echo(f"wrote {out}")
 

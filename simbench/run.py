@@ -15,6 +15,7 @@ from typing import Literal
 from fusion.messages import CategorySize
 from scenarios.categories import CATEGORY_SIZES, SIZE_SPREAD
 from scenarios.equipment import rig_sensors
+from scenarios.errors import Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments
 from scenarios.load import load_scenario
 from scenarios.scenario import Scenario, System
@@ -106,7 +107,7 @@ def stage(job: Job) -> Stage:
     rig = assemble(declared, rig_sensors(declared, family.beside))
     if job.size_px is not None:
         rig = resized(rig, *job.size_px)
-    faults.check_cameras(tuple(rig.cameras), family.where)
+    faults.check_cameras(tuple(rig.cameras), Where(file=None) if job.faults else family.where.at("faults"))
     return Stage(
         scenario=scenario,
         system=system,

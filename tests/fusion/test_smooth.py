@@ -45,10 +45,13 @@ def smoothed(
 @given(
     coefficients=arrays(np.float64, (4, 3), elements=st.floats(-5.0, 5.0)),
     bend=st.floats(-0.8, 0.8),
-    count=st.integers(4, 80),
+    count=st.integers(15, 80),
 )
 def test_a_cubic_comes_back_exactly(coefficients: np.ndarray, bend: float, count: int) -> None:
-    """The third power is kept below what phase one tolerates: 0.5 m away from the best parabola."""
+    """The third power is kept below what phase one tolerates: 0.5 m away from the best parabola.
+
+    From 15 samples on: with a handful, a parabola through three of them can be that far from the others.
+    """
     unit = np.linspace(-1.0, 1.0, count)
     coefficients[3] = bend
     position = np.vander(unit, 4, increasing=True) @ coefficients

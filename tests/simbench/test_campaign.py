@@ -35,9 +35,11 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> list[Job]:
             faults=faults,
             size_px=(320, 200),
         )
-        for system in ("car", "wearable")
-        for seed in (0, 1)
-        for faults in (("none",), ("timing.trigger_offset_ms=50", "motion.vibration_deg=1"))
+        for system, seed, faults in (
+            ("car", 0, ("none",)),
+            ("wearable", 1, ("timing.trigger_offset_ms=50", "motion.vibration_deg=1")),
+            ("wearable", 0, ("detector.edge_error=0.03",)),
+        )
     ]
 
 

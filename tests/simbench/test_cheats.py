@@ -25,7 +25,7 @@ from simbench.score.pairs import eligible_pairs
 from simbench.truth import GnssReference, ImageTruth, ObjectInfo, ScanTruth, TrueBox, Truth
 from simbench.world import World
 from tests.simbench import cheats
-from tests.simbench.support import faults, reachable, recorded, staged, write_scenario
+from tests.simbench.support import faults, reachable, staged, unproved, write_scenario
 
 OURS = ("static_projection", "static_projection_ground", "probabilistic")
 
@@ -40,7 +40,7 @@ def medium(system: str = "car", seed: int = 0, **changes: object) -> Stage:
 def captured() -> Captured:
     """With a detector that misses nothing: what is lost is lost by the pipeline."""
     with mock.patch("simbench.sensors.detector.recall", lambda *_: 1.0):
-        return recorded(medium())
+        return unproved(medium())
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +120,7 @@ def test_a_target_longer_than_its_category_raises_the_error() -> None:
             for name, actor in at.system.actors.items()
         }
         at = rebuilt(at, actors)
-        captured = recorded(at)
+        captured = unproved(at)
         errors.append(value(run_case("probabilistic", captured), "mae_longitudinal_m.raw"))
     assert errors[1] > errors[0] + 0.1
 
@@ -136,18 +136,16 @@ def rebuilt(at: Stage, actors: object) -> Stage:
 
 
 def at_rest(name: str) -> Scenario:
-    """A catalogue scenario in which nobody moves; the target stands where it is well seen."""
+    """A catalogue scenario in which nobody moves; the target stands 10 m away."""
     scenario = load_scenario(name).resolve(0)
     systems = {}
     for key, system in scenario.systems.items():
         actors = {}
+        ((ego_x, _),) = system.actors[system.ego].path.waypoints_m
         for actor_name, actor in system.actors.items():
-            (x, y), *_ = actor.path.waypoints_m
-            path = actor.path.model_copy(
-                update={
-                    "waypoints_m": ((x if actor_name == system.ego else 0.5 * x + 6.0, y),), "speed_mps": 0.0,
-                }
-            )  # fmt: skip
+            ((x, y),) = actor.path.waypoints_m
+            near = ego_x + 10.0 * np.sign(x - ego_x)
+            path = actor.path.model_copy(update={"waypoints_m": ((float(near), y),), "speed_mps": 0.0})
             actors[actor_name] = actor.model_copy(update={"path": path})
         systems[key] = system.model_copy(update={"actors": actors, "duration_s": 1.0})
     background = tuple(s.model_copy(update={"speed_mps": 0.0}) for s in scenario.background)
@@ -158,9 +156,10 @@ def at_rest(name: str) -> Scenario:
 def test_at_rest_an_offset_of_100_ms_changes_no_row(tmp_path: Path, system: str) -> None:
     path = write_scenario(tmp_path, at_rest("overtake-approach"))
     at = stage(Job(scenario=str(path), system=system, seed=0, pipelines=(), size_px=(320, 200)))
+    at = replace(at, rig=replace(at.rig, lidar=at.rig.lidar.model_copy(update={"columns": 256})))
     rows = []
     for specs in ((), (TriggerOffset(offset_ms=100.0),)):
-        captured = recorded(replace(at, faults=faults(*specs)))
+        captured = unproved(replace(at, faults=faults(*specs)))
         found = [run_case(name, captured) for name in OURS]
         assert {case.status for case in found} == {"ok"}
         assert value(found[0], "recall") > 0.5
@@ -200,7 +199,7 @@ def test_nothing_that_a_pipeline_gets_reaches_the_truth(captured: Captured) -> N
 
 @cache
 def ordinary(system: str) -> Captured:
-    return recorded(medium(system, 1), 1)
+    return unproved(medium(system, 1), 1)
 
 
 def auc(score: list[float], positive: list[bool]) -> float:
@@ -289,7 +288,7 @@ def test_intensity_does_not_tell_the_target_from_other_objects_with_boxes(system
 
 def _scans(at: Stage, seed: int) -> tuple[Truth, list[LidarScan]]:
     with mock.patch("simbench.capture._boxes_in", lambda *_: ()):
-        recording = recorded(at, seed).recording
+        recording = unproved(at, seed).recording
     return recording.truth, [m for m in recording.messages if isinstance(m, LidarScan)]
 
 

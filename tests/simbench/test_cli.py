@@ -176,7 +176,7 @@ BAD_WORDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     ),
     "seeds": (("overtake-approach", "--seeds", "one"), ("--seeds", "'one'")),
     "seeds backwards": (("overtake-approach", "--seeds", "3-1"), ("--seeds", "'3-1'")),
-    "seeds in Arabic digits": (("overtake-approach", "--seeds", "²"), ("--seeds",)),
+    "seeds in superscript": (("overtake-approach", "--seeds", "²"), ("--seeds",)),
     "no seeds": (("overtake-approach", "--seeds", ""), ("--seeds",)),
     "a negative seed": (("overtake-approach", "--seeds", "-1"), ("--seeds",)),
     "a seed too large": (("overtake-approach", "--seeds", "9999999999999999999999"), ("seed",)),

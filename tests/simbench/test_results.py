@@ -29,13 +29,13 @@ FAULTS = ("timing.trigger_offset_ms={offset_ms: 50, jitter_ms: 5}", "detector.ed
 def shortened(job: Job) -> Stage:
     at = stage(job)
     coarse = staged(
-        job.system, job.seed, scenario=job.scenario, duration_s=1.0, columns=128, size_px=(320, 200),
+        job.system, job.seed, scenario=job.scenario, duration_s=0.8, columns=128, size_px=(320, 200),
         background=True,
     )  # fmt: skip
     return replace(coarse, faults=at.faults)
 
 
-def results() -> tuple[JobResult, ...]:
+def results(seeds: tuple[int, ...] = (0, 3)) -> tuple[JobResult, ...]:
     jobs = [
         Job(
             scenario="overtake-recede",
@@ -45,7 +45,7 @@ def results() -> tuple[JobResult, ...]:
             faults=FAULTS,
         )
         for system in ("car", "wearable")
-        for seed in (0, 3)
+        for seed in seeds
     ]
     with mock.patch("simbench.run.stage", shortened):
         return run_jobs(jobs, 1)
@@ -63,7 +63,7 @@ def content(found: tuple[JobResult, ...]) -> dict[str, list[dict[str, object]]]:
 
 def test_the_same_seeds_give_the_same_bytes_but_for_timings(found: tuple[JobResult, ...]) -> None:
     texts = []
-    for run in (found, results()):
+    for run in ([r for r in found if r.job.seed == 3], results((3,))):
         whole = copy.deepcopy(document(run, {}))
         assert whole.pop("timings")
         texts.append(json.dumps(whole, allow_nan=False))
