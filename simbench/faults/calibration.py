@@ -112,12 +112,5 @@ def receipts(
                 note=NOTE,
             )
         )
-    if others:
-        worst, sd_deg = max(others)
-        result.append(
-            untouched(
-                fault=KEY, quantity="turn of the other cameras", unit="deg", worst=worst, estimator_sd=sd_deg,
-                note=NOTE,
-            )
-        )  # fmt: skip
+    result += untouched(fault=KEY, quantity="turn of the other cameras", unit="deg", found=others, note=NOTE)
     return tuple(result)

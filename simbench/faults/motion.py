@@ -219,12 +219,7 @@ def flex_receipts(
                 note=NOTE,
             )
         )
-    if others:
-        worst, sd_deg = max(others)
-        result.append(
-            untouched(
-                fault=FLEX, quantity="bending of the other cameras", unit="deg", worst=worst,
-                estimator_sd=sd_deg, note=NOTE,
-            )
-        )  # fmt: skip
+    result += untouched(
+        fault=FLEX, quantity="bending of the other cameras", unit="deg", found=others, note=NOTE
+    )
     return tuple(result)

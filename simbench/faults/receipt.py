@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf, isfinite
 from typing import Final, Literal
 
 Status = Literal["ok", "mismatch", "unverifiable"]
@@ -74,22 +76,28 @@ def judge(
 
 
 def untouched(
-    *, fault: str, quantity: str, unit: str, worst: float, estimator_sd: float, note: str
-) -> Receipt:
-    """What a fault must leave alone: `worst` is the largest effect found there. `ok` within 5 SD of
-    nothing.
+    *, fault: str, quantity: str, unit: str, found: Sequence[tuple[float, float]], note: str
+) -> tuple[Receipt, ...]:
+    """What a fault must leave alone: `found` holds (effect, estimator SD) of every sensor that it spares. One
+    receipt about the one that stands out most against its own SD, `ok` within 5 SD of nothing; none where
+    there is no such sensor.
     """
-    smallest = 5.0 * estimator_sd
-    return Receipt(
-        fault=fault,
-        quantity=quantity,
-        unit=unit,
-        requested=0.0,
-        realised=0.0,
-        measured=worst,
-        estimator_sd=estimator_sd,
-        allowed=0.0,
-        smallest=smallest,
-        note=note,
-        status=OK if abs(worst) <= smallest else MISMATCH,
+    if not found:
+        return ()
+    worst, sd = max(found, key=lambda pair: abs(pair[0]) / pair[1] if isfinite(pair[0]) else inf)
+    smallest = 5.0 * sd
+    return (
+        Receipt(
+            fault=fault,
+            quantity=quantity,
+            unit=unit,
+            requested=0.0,
+            realised=0.0,
+            measured=worst,
+            estimator_sd=sd,
+            allowed=0.0,
+            smallest=smallest,
+            note=note,
+            status=OK if abs(worst) <= smallest else MISMATCH,
+        ),
     )

@@ -54,14 +54,7 @@ def receipts(
             result += _of_one(spec, item.camera, drawn_ms, found_ms, one_sd_ms, NOTE)
         else:
             others.append((float(np.abs(found_ms).max()), max(one_sd_ms, FLOOR_MS)))
-    if others:
-        worst, sd_ms = max(others)
-        result.append(
-            untouched(
-                fault=KEY, quantity="delay of the other cameras", unit="ms", worst=worst, estimator_sd=sd_ms,
-                note=NOTE,
-            )
-        )  # fmt: skip
+    result += untouched(fault=KEY, quantity="delay of the other cameras", unit="ms", found=others, note=NOTE)
     return tuple(result)
 
 

@@ -12,7 +12,7 @@ import pytest
 
 from scenarios.faults import CalibrationRotation, EdgeError, FaultSpec, Flex, TriggerOffset, Vibration
 from simbench.capture import Drawn
-from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Receipt, judge
+from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Receipt, judge, untouched
 from simbench.run import Stage
 from tests.simbench.support import (
     ALL_FAULTS,
@@ -354,3 +354,23 @@ def test_measured_minus_realised_is_within_the_published_errors() -> None:
         assert len(scores) >= 30
         assert abs(np.mean(scores)) < 0.4, (kind, np.mean(scores))
         assert np.std(scores) <= 1.0, (kind, np.std(scores))
+
+
+@pytest.mark.parametrize(
+    ("found", "measured", "status"),
+    [
+        ([(0.4, 0.1), (0.06, 0.01)], 0.06, MISMATCH),  # the smaller effect is the one beyond its own 5 SD
+        ([(0.4, 0.1), (0.04, 0.01)], 0.4, OK),
+        ([(0.4, 0.1), (float("nan"), 0.01)], None, MISMATCH),
+    ],
+)
+def test_of_the_spared_cameras_the_one_farthest_beyond_its_own_uncertainty_decides(
+    found: list[tuple[float, float]], measured: float | None, status: str
+) -> None:
+    (receipt,) = untouched(fault="f", quantity="q", unit="u", found=found, note="")
+    assert receipt.status == status
+    assert measured is None or receipt.measured == measured
+
+
+def test_where_every_camera_is_struck_there_is_no_receipt_about_others() -> None:
+    assert untouched(fault="f", quantity="q", unit="u", found=[], note="") == ()
