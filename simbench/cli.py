@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from simbench.run import Job, JobResult
+    from simbench.case import Job, JobResult
 
 BASELINES = ("static_projection", "static_projection_ground", "probabilistic")
 FAILED, BAD_INPUT, BENCH_ERROR, NOTHING = 1, 2, 3, 5
@@ -124,7 +124,7 @@ def demo(
 
     Example: simbench demo --out out/demo
     """
-    from simbench.run import Job
+    from simbench.case import Job
 
     planned = [
         Job(
@@ -165,8 +165,9 @@ def run(
 
     from scenarios.fault_set import parse_fault_arguments
     from scenarios.load import load_scenario
+    from simbench.case import Job
     from simbench.plugins import load_pipeline
-    from simbench.run import Job, effective_faults
+    from simbench.stage import faults_of
 
     if not targets:
         click.echo("simbench: nothing selected: name at least one scenario (see 'simbench list').", err=True)
@@ -185,7 +186,7 @@ def run(
                     images="gl" if images == "gl" else "none", size_px=size,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
-                if not alone and len(effective_faults(job)) > 0:
+                if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
                     planned.append(replace(job, faults=("none",), images="none"))
                 planned.append(job)
     _execute(planned, out, images, jobs, as_json)
@@ -201,7 +202,7 @@ def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as
     from simbench.environment import environment
     from simbench.files import prepare_folder
     from simbench.report.page import write_report
-    from simbench.run import stage
+    from simbench.stage import stage
 
     first: dict[tuple[str, str, tuple[str, ...]], Job] = {}
     for job in planned:

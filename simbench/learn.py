@@ -12,15 +12,12 @@ import numpy as np
 
 from fusion.camera import project_points
 from fusion.shape import format_benchmark_shapes, learn_shape
-from scenarios.equipment import rig_sensors
 from scenarios.fault_set import FaultSet
 from scenarios.load import load_scenario
 from scenarios.scenario import Scenario, System
 from simbench.capture import capture
-from simbench.run import CATEGORIES
 from simbench.score.frames import frames_of
-from simbench.sensors.rig import assemble
-from simbench.world import build_world, part_info
+from simbench.stage import CATEGORIES, set_stage
 
 FIRST_SEED = 100_000
 SCENARIOS = (("overtake-approach", "car"), ("overtake-approach", "wearable"), ("overtake-recede", "car"))
@@ -65,13 +62,12 @@ def _collect(
 ) -> None:
     family = load_scenario(name)
     scenario = resize(family.resolve(seed), system_name, scale)
-    system = scenario.system(system_name)
-    declared = family.rig(system.rig)
-    rig = assemble(declared, rig_sensors(declared, family.beside))
-    world = build_world(scenario, system, seed)
-    recording = capture(system, rig, world, FaultSet(), CATEGORIES, seed).recording
+    at = set_stage(family, scenario, system_name, FaultSet(), seed)
+    recording = capture(at.system, at.rig, at.world, at.faults, CATEGORIES, seed).recording
     wanted = {
-        o.object_id: o.category for o in world.objects if o.category in LEARNED and _unusual(o.name, o.size_m)
+        info.object_id: info.category
+        for info, scale in zip(at.world.objects, at.world.scale, strict=True)
+        if info.category in LEARNED and unusual(scale)
     }
     for frame in frames_of(recording):
         for camera, view in frame.views.items():
@@ -93,7 +89,6 @@ def _collect(
                     pixels[wanted[box.object_id]].append(found)
 
 
-def _unusual(name: str, size_m: tuple[float, float, float]) -> bool:
-    """Whether an object's size is outside what evaluation draws."""
-    part = {"rider": "escooter_rider"}.get(name, name.rsplit("-", 1)[0])
-    return abs(size_m[2] / float(part_info(part).size_m[2]) - 1.0) > 0.08
+def unusual(scale: float) -> bool:
+    """Whether an object's scale is outside what evaluation draws."""
+    return abs(scale - 1.0) > 0.08

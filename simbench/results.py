@@ -18,8 +18,8 @@ import numpy as np
 
 from scenarios.describe import describe
 from scenarios.seeding import stream
+from simbench.case import ORACLE, Case, Job, JobResult
 from simbench.files import write_text
-from simbench.run import ORACLE, Case, Job, JobResult
 from simbench.score.metrics import METRICS
 from simbench.score.statistics import summarize
 

@@ -94,6 +94,7 @@ class World:
     geom_object: Int32[np.ndarray, " g"]
     reflectivity: Float64[np.ndarray, " g"]
     objects: tuple[ObjectInfo, ...]
+    scale: tuple[float, ...]  # of each object against its part
     box_centre_m: Float64[np.ndarray, "o 3"]  # in the object's root frame
     static_rotation: Float64[np.ndarray, "o 3 3"]  # T_world_root of objects that stand
     static_position_m: Float64[np.ndarray, "o 3"]
@@ -111,10 +112,6 @@ class World:
     def first_geom(self) -> tuple[int, ...]:
         """By object id, the first of its geoms."""
         return tuple(int(np.flatnonzero(mask)[0]) for mask in self.masks)
-
-    def object_geoms(self, object_id: int) -> Bool[np.ndarray, " g"]:
-        """Which geoms belong to an object."""
-        return self.masks[object_id]
 
     def find(self, name: str) -> ObjectInfo:
         """The object of that name."""
@@ -271,6 +268,7 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
     return _tabulate(
         model,
         tuple(objects),
+        tuple(entry[3] for entry in entries),
         np.array(centres),
         np.array(rotations),
         np.array(positions),
@@ -344,8 +342,8 @@ def _paint(spec: Any, scenario: Scenario, scene: dict[str, tuple[list[float], fl
 
 
 def _tabulate(
-    model: Any, objects: tuple[ObjectInfo, ...], centres: np.ndarray, rotations: np.ndarray,
-    positions: np.ndarray, moving: list[tuple[str, int, Track]], reflectivity: dict[str, float],
+    model: Any, objects: tuple[ObjectInfo, ...], scale: tuple[float, ...], centres: np.ndarray,
+    rotations: np.ndarray, positions: np.ndarray, moving: list[tuple[str, int, Track]], reflectivity: dict[str, float],
 ) -> World:  # fmt: skip
     import mujoco
 
@@ -434,6 +432,7 @@ def _tabulate(
         geom_object=geom_object,
         reflectivity=value,
         objects=objects,
+        scale=scale,
         box_centre_m=centres,
         static_rotation=rotations,
         static_position_m=positions,

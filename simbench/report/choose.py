@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from simbench.case import ORACLE, Case, JobResult
 from simbench.exhibit import PairView
-from simbench.run import ORACLE, Case, JobResult
 from simbench.score.mapping import PairScore
 
 BASELINE, METHOD = "static_projection", "probabilistic"

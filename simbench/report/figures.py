@@ -15,6 +15,7 @@ import numpy as np
 from markupsafe import Markup
 
 from fusion.explain import AoiExplanation
+from simbench.case import JobResult
 from simbench.report import palette
 from simbench.report.choose import (
     ORACLE,
@@ -27,7 +28,6 @@ from simbench.report.choose import (
 )
 from simbench.report.paper import TABLE_II
 from simbench.report.words import percent, pipeline_words, signed_m
-from simbench.run import JobResult
 from simbench.score.budget import PARTS
 
 COLUMN = 400.0  # user units

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
 from scenarios.errors import BadInput
+from simbench.case import Job, JobResult
 from simbench.exhibit import PairView
 from simbench.files import write_text
 from simbench.report import figures, palette, tables
@@ -37,7 +38,6 @@ from simbench.report.words import (
     runs_words,
     sentence,
 )
-from simbench.run import Job, JobResult
 from simbench.score.statistics import MIN_RUNS
 
 SHARPER = 2  # pictures are drawn with twice the camera's pixels, for print

@@ -20,13 +20,15 @@ from fusion.messages import CategorySize, Detection, LidarScan
 from fusion.shape import BenchmarkShapes, ShapeConfig
 from fusion.timing import StepClock
 from scenarios.seeding import stream
-from simbench.capture import Drawn, draw, set_in_motion
+from simbench.capture import set_in_motion
+from simbench.case import Job
 from simbench.exhibit import PairView
+from simbench.faults.draw import Drawn, draw
 from simbench.motion import Motion, at
 from simbench.plugins import load_pipeline
-from simbench.run import CATEGORIES, Job, Stage, stage
 from simbench.sensors import lidar
 from simbench.sensors.render import Renderer
+from simbench.stage import CATEGORIES, Stage, stage
 
 LARGEST_PX = 2048  # of the renderer's buffer
 

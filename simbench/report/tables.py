@@ -6,11 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from scenarios.seeding import stream
+from simbench.case import ORACLE, JobResult
 from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Status
 from simbench.report.choose import Group, case_of
 from simbench.report.words import NONE, pipeline_words
 from simbench.results import latency_ms
-from simbench.run import ORACLE, JobResult
 from simbench.score.metrics import METRICS
 from simbench.score.statistics import summarize
 

@@ -15,13 +15,13 @@ import numpy as np
 from jaxtyping import UInt8
 
 from fusion.messages import BoxPx
+from simbench.case import JobResult
 from simbench.exhibit import PairView
 from simbench.report import palette
 from simbench.report.choose import Group, groups_of, pairs_of, shift_px
 from simbench.report.overlay import WIDTH, Marks, common_field, cut, dot_size, jpeg_uri, marks_of, thinned
 from simbench.report.pictures import Replay
 from simbench.report.words import NONE, fault_words, percent, pipeline_words
-from simbench.run import JobResult
 
 SLOWED = 4
 PANEL_PX = (560, 420)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenarios.fault_set import FaultSet
+from simbench.case import ORACLE
 from simbench.report.choose import Group, mean_of_runs
-from simbench.run import ORACLE
 from simbench.score.statistics import MIN_RUNS
 
 NONE = "–"

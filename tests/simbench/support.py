@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import gc
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -19,12 +18,14 @@ from scenarios.describe import describe
 from scenarios.fault_set import FaultSet
 from scenarios.faults import CalibrationRotation, EdgeError, FaultSpec, Flex, TriggerOffset, Vibration
 from scenarios.scenario import LidarSensor, Scenario
-from simbench.capture import Captured, Drawn, capture, draw, receipts
-from simbench.faults.estimate import CameraEvidence
+from simbench.capture import Captured, capture
+from simbench.case import Job
+from simbench.faults.draw import Drawn, draw
+from simbench.faults.proof import receipts
 from simbench.faults.receipt import Receipt
 from simbench.recording import Recording
-from simbench.run import CATEGORIES, Job, Stage, stage
 from simbench.sensors.rig import resized
+from simbench.stage import CATEGORIES, Stage, stage
 from simbench.truth import ScanTruth, TrueBox
 from simbench.world import build_world
 
@@ -87,20 +88,11 @@ def posed(at: Stage, seed: int = 0) -> Captured:
         return recorded(at, seed)
 
 
-def unproved(at: Stage, seed: int = 0, scans_of: Captured | None = None) -> Captured:
-    """A recording without evidence for receipts. `scans_of`: a recording of the same world and body shake,
-    whose scans are taken instead of casting them again.
-    """
-    replay: Iterator[tuple[LidarScan, ScanTruth]] = iter(())
-    if scans_of is not None:
-        delivered = (m for m in scans_of.recording.messages if isinstance(m, LidarScan))
-        replay = zip(delivered, scans_of.recording.truth.scans, strict=True)
-    with (
-        mock.patch("simbench.capture._evidence", _no_evidence),
-        mock.patch("simbench.capture.lidar.sweep", lambda *_: next(replay))
-        if scans_of is not None
-        else nullcontext(),
-    ):
+def with_scans_of(scans_of: Captured, at: Stage, seed: int = 0) -> Captured:
+    """A recording with the scans of another one of the same world and body shake, not cast again."""
+    delivered = (m for m in scans_of.recording.messages if isinstance(m, LidarScan))
+    replay = zip(delivered, scans_of.recording.truth.scans, strict=True)
+    with mock.patch("simbench.capture.lidar.sweep", lambda *_: next(replay)):
         return recorded(at, seed)
 
 
@@ -118,14 +110,6 @@ def boxed(at: Stage, seed: int = 0) -> Captured:
         mock.patch("simbench.capture._boxes_in", lambda *_: next(replay)),
     ):
         return recorded(at, seed)
-
-
-def _no_evidence(name: str, *_: object) -> CameraEvidence:
-    rows, one = np.zeros((0, 3)), np.zeros(3)
-    return CameraEvidence(
-        camera=name, taken_ns=np.zeros(0, dtype=np.int64), turn_rad=rows, shift_m=rows,
-        R_ego_camera=np.eye(3), position_ego_m=one, pivot_ego_m=one, speed_mps=np.zeros(0),
-    )  # fmt: skip
 
 
 _BOXES: dict[tuple[int, float, int], tuple[object, list[tuple[TrueBox, ...]]]] = {}

@@ -9,8 +9,8 @@ import pytest
 from scenarios.errors import BadInput
 from scenarios.load import load_scenario
 from simbench.campaign import run_jobs
+from simbench.case import Job, JobResult
 from simbench.results import document
-from simbench.run import Job, JobResult
 from tests.simbench.cheats import named
 from tests.simbench.support import write_scenario
 

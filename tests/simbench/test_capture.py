@@ -10,7 +10,7 @@ import pytest
 from fusion.messages import CameraImage, Detections, EgoMotion, LidarScan
 from scenarios.faults import TriggerOffset
 from simbench.capture import Captured, capture
-from simbench.run import CATEGORIES
+from simbench.stage import CATEGORIES
 from tests.simbench.support import bytes_of, digest, recorded, staged
 
 

@@ -17,15 +17,17 @@ from scenarios.faults import TriggerOffset
 from scenarios.load import list_scenarios, load_scenario
 from scenarios.scenario import Scenario
 from simbench.capture import Captured
+from simbench.case import Case, Job
 from simbench.learn import FIRST_SEED, SCALES
 from simbench.motion import Motion
-from simbench.run import Case, Job, Stage, run_case, stage
+from simbench.run import run_case
 from simbench.score.frames import frames_of
 from simbench.score.pairs import eligible_pairs
+from simbench.stage import Stage, stage
 from simbench.truth import GnssReference, ImageTruth, ObjectInfo, ScanTruth, TrueBox, Truth
 from simbench.world import World
 from tests.simbench import cheats
-from tests.simbench.support import faults, reachable, staged, unproved, write_scenario
+from tests.simbench.support import faults, reachable, recorded, staged, write_scenario
 
 OURS = ("static_projection", "static_projection_ground", "probabilistic")
 
@@ -40,7 +42,7 @@ def medium(system: str = "car", seed: int = 0, **changes: object) -> Stage:
 def captured() -> Captured:
     """With a detector that misses nothing: what is lost is lost by the pipeline."""
     with mock.patch("simbench.sensors.detector.recall", lambda *_: 1.0):
-        return unproved(medium())
+        return recorded(medium())
 
 
 @pytest.fixture(scope="module")
@@ -120,7 +122,7 @@ def test_a_target_longer_than_its_category_raises_the_error() -> None:
             for name, actor in at.system.actors.items()
         }
         at = rebuilt(at, actors)
-        captured = unproved(at)
+        captured = recorded(at)
         errors.append(value(run_case("probabilistic", captured), "mae_longitudinal_m.raw"))
     assert errors[1] > errors[0] + 0.1
 
@@ -159,7 +161,7 @@ def test_at_rest_an_offset_of_100_ms_changes_no_row(tmp_path: Path, system: str)
     at = replace(at, rig=replace(at.rig, lidar=at.rig.lidar.model_copy(update={"columns": 256})))
     rows = []
     for specs in ((), (TriggerOffset(offset_ms=100.0),)):
-        captured = unproved(replace(at, faults=faults(*specs)))
+        captured = recorded(replace(at, faults=faults(*specs)))
         found = [run_case(name, captured) for name in OURS]
         assert {case.status for case in found} == {"ok"}
         assert value(found[0], "recall") > 0.5
@@ -199,7 +201,7 @@ def test_nothing_that_a_pipeline_gets_reaches_the_truth(captured: Captured) -> N
 
 @cache
 def ordinary(system: str) -> Captured:
-    return unproved(medium(system, 1), 1)
+    return recorded(medium(system, 1), 1)
 
 
 def auc(score: list[float], positive: list[bool]) -> float:
@@ -288,7 +290,7 @@ def test_intensity_does_not_tell_the_target_from_other_objects_with_boxes(system
 
 def _scans(at: Stage, seed: int) -> tuple[Truth, list[LidarScan]]:
     with mock.patch("simbench.capture._boxes_in", lambda *_: ()):
-        recording = unproved(at, seed).recording
+        recording = recorded(at, seed).recording
     return recording.truth, [m for m in recording.messages if isinstance(m, LidarScan)]
 
 

@@ -19,9 +19,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from scenarios.load import load_scenario
+from simbench.case import Job
 from simbench.cli import main
 from simbench.learn import resize
-from simbench.run import Job, Stage, stage
+from simbench.stage import Stage, stage
 from tests.simbench.cheats import named
 from tests.simbench.support import staged, write_scenario
 

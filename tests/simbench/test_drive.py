@@ -17,7 +17,7 @@ from fusion.messages import (
     Trajectory,
 )
 from simbench.drive import Driven, drive
-from simbench.run import CATEGORIES
+from simbench.stage import CATEGORIES
 from tests.simbench.cheats import ReturnsText, Silent
 from tests.simbench.support import recorded, staged
 

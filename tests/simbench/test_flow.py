@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from scenarios.load import load_scenario
-from simbench.run import Job, run_job
+from simbench.case import Job
+from simbench.run import run_job
 from simbench.sensors import gl
 from tests.simbench.support import write_scenario
 

@@ -9,16 +9,20 @@ import pytest
 
 from fusion.shape import parse_benchmark_shapes
 from scenarios.load import load_scenario
-from simbench.learn import FIRST_SEED, LEARNED, SCALES, _unusual, learn, resize
-from simbench.world import build_world
+from simbench.learn import FIRST_SEED, LEARNED, SCALES, learn, resize, unusual
+from simbench.world import build_world, part_info
 
 
 @pytest.mark.parametrize("scale", SCALES)
 def test_every_object_that_is_learned_from_has_a_size_that_evaluation_never_draws(scale: float) -> None:
     scenario = resize(load_scenario("overtake-approach").resolve(FIRST_SEED), "car", scale)
     system = scenario.system("car")
-    objects = build_world(scenario, system, FIRST_SEED).objects
-    used = [o for o in objects if o.category in LEARNED and _unusual(o.name, o.size_m)]
+    world = build_world(scenario, system, FIRST_SEED)
+    sized = zip(world.objects, world.scale, strict=True)
+    used = [o for o, scale in sized if o.category in LEARNED and unusual(scale)]
+    for info in used:
+        part = {"rider": "escooter_rider"}.get(info.name, info.name.rsplit("-", 1)[0])
+        assert abs(info.size_m[2] / part_info(part).size_m[2] - 1.0) > 0.08
     assert {"car", "rider"} <= {o.name for o in used}
     assert all(actor.scale == scale for actor in system.actors.values())
 
@@ -26,8 +30,9 @@ def test_every_object_that_is_learned_from_has_a_size_that_evaluation_never_draw
 def test_objects_of_evaluation_are_not_learned_from() -> None:
     for seed in range(3):
         scenario = load_scenario("overtake-approach").resolve(seed)
-        objects = build_world(scenario, scenario.system("car"), seed).objects
-        assert not [o.name for o in objects if o.category in LEARNED and _unusual(o.name, o.size_m)]
+        world = build_world(scenario, scenario.system("car"), seed)
+        sized = zip(world.objects, world.scale, strict=True)
+        assert not [o.name for o, scale in sized if o.category in LEARNED and unusual(scale)]
 
 
 def test_the_other_system_and_the_order_of_systems_stay() -> None:

@@ -151,7 +151,7 @@ def test_an_objects_centre_is_the_middle_of_its_box(scene: Stage) -> None:
     for info in world.objects:
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         root = at(motion.object_root(info.object_id, t_ns))
-        for geom in world.geom_model_id[world.object_geoms(info.object_id)]:
+        for geom in world.geom_model_id[world.masks[info.object_id]]:
             points = surface(int(model.geom_type[geom]), model.geom_size[geom])
             points = points @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
             local = root.inverse().apply(points)

@@ -17,9 +17,10 @@ from click.testing import CliRunner
 
 from scenarios.load import load_scenario
 from simbench.campaign import run_jobs
+from simbench.case import Job, JobResult
 from simbench.results import document, reproduce, write
-from simbench.run import Job, JobResult, Stage, stage
 from simbench.score.metrics import METRICS
+from simbench.stage import Stage, stage
 from tests.simbench import cheats
 from tests.simbench.support import staged
 

@@ -13,13 +13,15 @@ from fusion.pipelines.probabilistic import Probabilistic, ProbabilisticConfig
 from fusion.shape import ShapeConfig
 from scenarios.errors import BadInput
 from scenarios.faults import FaultSpec, TriggerOffset
+from simbench.case import ORACLE, Case, Job, JobResult
 from simbench.drive import drive
 from simbench.faults.receipt import MISMATCH
-from simbench.run import ORACLE, Case, Job, JobResult, Stage, run_case, run_job, stage
+from simbench.run import run_case, run_job
 from simbench.score.metrics import METRICS
 from simbench.score.score import Scores, score
+from simbench.stage import Stage, stage
 from tests.simbench import cheats
-from tests.simbench.support import ALL_FAULTS, staged, unproved, without_faults
+from tests.simbench.support import ALL_FAULTS, recorded, staged, with_scans_of, without_faults
 
 JOB = Job(scenario="overtake-recede", system="car", seed=0, pipelines=("static_projection",))
 
@@ -162,7 +164,7 @@ def test_an_offset_of_100_ms_alone_moves_tpr_by_less_than_5_percent(system: str,
             system, seed, specs=(TriggerOffset(offset_ms=offset_ms),), duration_s=None, columns=256,
             size_px=(320, 200), background=True,
         )  # fmt: skip
-        captured = unproved(at, seed, captured)
+        captured = recorded(at, seed) if captured is None else with_scans_of(captured, at, seed)
         cases = [run_case(name, captured) for name in ("static_projection", "probabilistic")]
         assert {c.status for c in cases} == {"ok"}
         tpr.append([next(r.value for r in c.rows if r.metric == "tpr") for c in cases])
@@ -173,7 +175,7 @@ def test_an_offset_of_100_ms_alone_moves_tpr_by_less_than_5_percent(system: str,
 def test_the_literal_argmax_of_kl_lowers_the_score() -> None:
     """As printed the paper picks the least similar cluster; paired on the same recordings."""
     at = staged("wearable", duration_s=None, columns=256, size_px=(320, 200), background=True)
-    recording = unproved(at).recording
+    recording = recorded(at).recording
     found = []
     for literal in (False, True):
         config = ProbabilisticConfig(shape=ShapeConfig(literal_kl=literal))

@@ -13,7 +13,7 @@ import pytest
 from scenarios.faults import CalibrationRotation, EdgeError, FaultSpec, Flex, TriggerOffset, Vibration
 from simbench.capture import Drawn
 from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Receipt, judge, untouched
-from simbench.run import Stage
+from simbench.stage import Stage
 from tests.simbench.support import (
     ALL_FAULTS,
     boxed,

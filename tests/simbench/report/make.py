@@ -10,10 +10,10 @@ import numpy as np
 from scenarios.fault_set import FaultSet, parse_fault_arguments
 from scenarios.load import load_scenario
 from scenarios.scenario import Scenario
+from simbench.case import ORACLE, Case, Job, JobResult
 from simbench.drive import Driven
 from simbench.exhibit import PairView
 from simbench.faults.receipt import Receipt, judge
-from simbench.run import ORACLE, Case, Job, JobResult
 from simbench.score.budget import PARTS, Budget
 from simbench.score.localization import Fix, FrameScore
 from simbench.score.mapping import PairScore

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from fusion.messages import CameraImage, LidarScan
+from simbench.case import Job, JobResult
 from simbench.report.page import write_report
 from simbench.report.pictures import Replay, explain_view, take_pictures
 from simbench.report.video import encode, find_video, shown_views, write_video
-from simbench.run import Job, JobResult, record, run_job, stage
+from simbench.run import run_job
 from simbench.sensors.gl import RenderingUnavailable
 from simbench.sensors.render import Renderer
+from simbench.stage import record, stage
 
 PIPELINES = ("static_projection", "probabilistic")
 SHORT = """

@@ -185,7 +185,7 @@ def test_boxes_are_the_extent_of_rays_through_every_pixel(scene: Stage, name: st
     owner = np.where(everything >= 0, world.geom_object[everything], -1)
     compared = 0
     for info in world.objects:
-        mask = world.object_geoms(info.object_id)
+        mask = world.masks[info.object_id]
         box = true_box(view, info.object_id, mask, 4.0)
         columns, rows = np.nonzero(owner == info.object_id)
         if box is None or box.visible_px is None:

@@ -192,7 +192,7 @@ def shots() -> Iterator[list[Shot]]:
                     view = View(of.world.geoms, R[0], p[0], T, camera)
                     ids, depth = renderer.ids_and_depth(motion, int(t_ns[0]), T, camera)
                     boxes = tuple(
-                        (true_box(view, o.object_id, of.world.object_geoms(o.object_id), 4.0), o.object_id)
+                        (true_box(view, o.object_id, of.world.masks[o.object_id], 4.0), o.object_id)
                         for o in of.world.objects
                         if o.name != of.system.ego
                     )
@@ -253,7 +253,7 @@ def test_visible_fraction_is_the_share_of_the_mask(shots: list[Shot]) -> None:
         for box, object_id in shot.boxes:
             if box is None or (box.amodal_px[3] - box.amodal_px[1]) < 40:
                 continue
-            own = shot.view.cast(np.arange(960), np.arange(600), shot.of.world.object_geoms(object_id)) >= 0
+            own = shot.view.cast(np.arange(960), np.arange(600), shot.of.world.masks[object_id]) >= 0
             share = (shot.ids == object_id).sum() / own.sum()
             assert box.visible_fraction == pytest.approx(share, abs=0.06)
 

@@ -1,0 +1,72 @@
+"""What one run is asked for and what it gives: a `Job`, its `Case`s, its `JobResult`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from scenarios.fault_set import FaultSet
+from scenarios.scenario import Scenario
+from simbench.drive import Driven
+from simbench.exhibit import PairView
+from simbench.faults.receipt import Receipt
+from simbench.score.metrics import METRICS, Row
+from simbench.score.score import Scores
+
+ORACLE = "oracle"
+Status = Literal["ok", "pipeline_error", "timeout", "bench_error", "receipt_mismatch"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """What to record and what to run on it. `faults`: as `--faults` gives them, in place of or on top of the
+    scenario's own; empty: just those."""
+
+    scenario: str
+    system: str
+    seed: int
+    pipelines: tuple[str, ...]
+    faults: tuple[str, ...] = ()
+    images: Literal["none", "gl"] = "none"
+    size_px: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Case:
+    """One pipeline on one recording. `scores` is None unless the status is `ok`."""
+
+    pipeline: str
+    status: Status
+    why: str | None
+    rows: tuple[Row, ...]
+    scores: Scores | None
+    driven: Driven | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class JobResult:
+    """All cases of a job, and what its report needs."""
+
+    job: Job
+    scenario: Scenario
+    faults: FaultSet
+    shake: str
+    receipts: tuple[Receipt, ...]
+    cases: tuple[Case, ...]
+    views: tuple[PairView, ...] = ()
+    timings_s: Mapping[str, float] = field(default_factory=dict)
+
+
+def scored(pipeline: str, scores: Scores, driven: Driven | None) -> Case:
+    """A case that went well."""
+    return Case(pipeline=pipeline, status="ok", why=None, rows=scores.rows, scores=scores, driven=driven)
+
+
+def failed(pipeline: str, status: Status, why: str) -> Case:
+    """A case without a score: every metric is null and says why."""
+    rows = tuple(
+        Row(metric=m.name, value=None, unit=m.unit, better=m.better, n=0, sd=None, why=f"{status}: {why}")
+        for m in METRICS
+    )
+    return Case(pipeline=pipeline, status=status, why=why, rows=rows, scores=None, driven=None)

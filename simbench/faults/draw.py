@@ -1,0 +1,83 @@
+"""What each fault is drawn to be in this run: the *realised* side of its receipt."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from fusion.messages import Calibration
+from scenarios.fault_set import FaultSet
+from scenarios.faults import CalibrationRotation, EdgeError, Flex, TriggerOffset, Vibration
+from scenarios.severity import Profile
+from simbench.faults import calibration as calibration_fault
+from simbench.faults import detector as detector_fault
+from simbench.faults import motion as motion_fault
+from simbench.faults import timing as timing_fault
+from simbench.sensors.rig import CameraTiming, SensorRig
+from simbench.shake import Shake
+from simbench.world import World
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawn:
+    """What this seed drew for each fault: the *realised* side of the receipts."""
+
+    profile: Profile
+    body_shake: Shake | None
+    flex: Mapping[str, Shake]
+    delays_ns: Mapping[str, Int64[np.ndarray, " f"]]
+    edge_errors: Mapping[str, Mapping[int, Float64[np.ndarray, "f 4"]]]
+    told: Calibration
+
+
+def struck(spec: TriggerOffset | Flex | CalibrationRotation, rig: SensorRig) -> tuple[str, ...]:
+    """The cameras that a fault acts on."""
+    return spec.named_cameras or tuple(rig.cameras)
+
+
+def draw(
+    rig: SensorRig,
+    world: World,
+    faults: FaultSet,
+    timing: Mapping[str, CameraTiming],
+    duration_s: float,
+    seed: int,
+) -> Drawn:
+    """Draw every fault from its own stream; none moves another's numbers."""
+    vibration, rotation = faults.get(Vibration), faults.get(CalibrationRotation)
+    offset, bend, edge_error = faults.get(TriggerOffset), faults.get(Flex), faults.get(EdgeError)
+    profile: Profile = "car" if rig.rig.body == "vehicle" else "rider"
+    if vibration is not None and vibration.profile != "auto":
+        profile = vibration.profile
+    told = rig.calibration
+    if rotation is not None:
+        told = calibration_fault.miscalibrate(told, rotation, struck(rotation, rig), seed)
+    delays, flex, edges = {}, {}, {}
+    if offset is not None:
+        for name in struck(offset, rig):
+            delays[name] = timing_fault.delays_ns(offset, name, len(timing[name].mid_ns), seed)
+    if bend is not None:
+        for name in struck(bend, rig):
+            flex[name] = motion_fault.bracket_shake(bend, name, duration_s, seed)
+    if edge_error is not None:
+        for name, camera in rig.cameras.items():
+            frames, period_s = len(timing[name].mid_ns), 1.0 / camera.rate_hz
+            edges[name] = detector_fault.edge_errors(edge_error, name, world.objects, frames, period_s, seed)
+    return Drawn(
+        profile=profile,
+        body_shake=motion_fault.body_shake(vibration, profile, duration_s, seed) if vibration else None,
+        flex=flex,
+        delays_ns=delays,
+        edge_errors=edges,
+        told=told,
+    )
+
+
+def shake_words(drawn: Drawn, duration_s: float) -> str:
+    """What the body's shake is, in words; empty when it does not shake."""
+    if drawn.body_shake is None:
+        return ""
+    return motion_fault.describe_shake(drawn.body_shake, drawn.profile, duration_s)

@@ -1,0 +1,95 @@
+"""Proof of effect: what the data itself says about every fault, against what was asked for and drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fusion.camera import project_points
+from fusion.geometry import rotation_log
+from fusion.messages import Detections, EgoMotion
+from scenarios.fault_set import FaultSet
+from scenarios.faults import CalibrationRotation, EdgeError, Flex, TriggerOffset, Vibration
+from simbench.capture import Captured
+from simbench.faults import calibration as calibration_fault
+from simbench.faults import detector as detector_fault
+from simbench.faults import motion as motion_fault
+from simbench.faults import timing as timing_fault
+from simbench.faults.draw import struck
+from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
+from simbench.faults.receipt import Receipt
+from simbench.sensors import fiducials
+from simbench.sensors.rig import SensorRig
+
+
+def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: float) -> tuple[Receipt, ...]:
+    """Requested, realised and measured of every fault that is on."""
+    if not faults:
+        return ()
+    drawn, truth = captured.drawn, captured.recording.truth
+    evidence, body = _evidence(captured, rig), _body(captured, rig)
+    result: list[Receipt] = []
+    if (offset := faults.get(TriggerOffset)) is not None:
+        result += timing_fault.receipts(offset, struck(offset, rig), drawn.delays_ns, evidence, body)
+    if (vibration := faults.get(Vibration)) is not None:
+        result += motion_fault.vibration_receipts(vibration, drawn.body_shake, duration_s, body, evidence)
+    if (bend := faults.get(Flex)) is not None:
+        result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
+    if (rotation := faults.get(CalibrationRotation)) is not None:
+        told = captured.recording.calibration
+        result += calibration_fault.receipts(
+            rotation, struck(rotation, rig), truth.calibration, drawn.told, told, evidence, body
+        )
+    if (edge_error := faults.get(EdgeError)) is not None:
+        sizes = {name: (c.width_px, c.height_px) for name, c in rig.pinholes.items()}
+        period_s = {1.0 / camera.rate_hz for camera in rig.cameras.values()}
+        detections = [m for m in captured.recording.messages if isinstance(m, Detections)]
+        result += detector_fault.receipts(
+            edge_error, drawn.edge_errors, detections, truth.images, sizes, max(period_s, default=1.0)
+        )
+    return tuple(result)
+
+
+def _body(captured: Captured, rig: SensorRig) -> BodyAttitude | None:
+    """The body's attitude by the gyro; None where the rig has none."""
+    if rig.imu is None:
+        return None
+    gyro = [m for m in captured.recording.messages if isinstance(m, EgoMotion)]
+    R_ego, _ = captured.motion.ego(np.array([m.stamp_ns for m in gyro], dtype=np.int64))
+    return gyro_attitude(gyro, np.arctan2(R_ego[:, 1, 0], R_ego[:, 0, 0]), rig.imu.gyro_noise_dps_rthz)
+
+
+def _evidence(captured: Captured, rig: SensorRig) -> tuple[CameraEvidence, ...]:
+    """Per camera, PnP on the known points of every frame, against the pose that the script predicts: the
+    place at the nominal mid-exposure, the attitude at the true one.
+    """
+    script, images = captured.script, captured.recording.truth.images
+    result = []
+    for name, camera in rig.pinholes.items():
+        taken = [image for image in images if image.sensor == name]
+        mid_ns = captured.timing[name].mid_ns
+        taken_ns = np.array([image.capture_ns for image in taken], dtype=np.int64)
+        R_ego, _ = script.ego(mid_ns)
+        R_ego_taken, _ = script.ego(taken_ns)
+        _, expected_m = script.sensor(name, mid_ns)
+        attitude, _ = script.sensor(name, taken_ns)
+        turns, shifts = [], []
+        for f, image in enumerate(taken):
+            # Surveyed points that lie in the real view: a camera may look far from where it should.
+            field = fiducials.points_m(camera, image.T_world_camera)
+            uv = project_points(field, image.T_world_camera.inverse(), camera)
+            rotation, position = camera_pose(field, uv, camera)
+            turns.append(rotation_log(R_ego_taken[f].T @ rotation @ attitude[f].T @ R_ego_taken[f]))
+            shifts.append(R_ego[f].T @ (position - expected_m[f]))
+        result.append(
+            CameraEvidence(
+                camera=name,
+                taken_ns=taken_ns,
+                turn_rad=np.array(turns),
+                shift_m=np.array(shifts),
+                R_ego_camera=rig.T_ego_sensor[name].rotation,
+                position_ego_m=rig.T_ego_sensor[name].translation_m,
+                pivot_ego_m=np.array(script.pivot_m),
+                speed_mps=script.world.actors[script.ego_actor].track.speed_at(mid_ns),
+            )
+        )
+    return tuple(result)

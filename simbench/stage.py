@@ -1,0 +1,93 @@
+"""A job made concrete: scenario, faults and rig resolved, the world built; and how to take its pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from fusion.messages import CategorySize
+from scenarios.categories import CATEGORY_SIZES, SIZE_SPREAD
+from scenarios.equipment import rig_sensors
+from scenarios.errors import Where
+from scenarios.fault_set import FaultSet, parse_fault_arguments
+from scenarios.load import Family, load_scenario
+from scenarios.scenario import Scenario, System
+from simbench.capture import Captured, TakePicture, capture
+from simbench.case import Job
+from simbench.plugins import reads_images
+from simbench.sensors.rig import SensorRig, assemble, resized
+from simbench.world import World, build_world
+
+CATEGORIES: Mapping[str, CategorySize] = {
+    name: CategorySize(mean_m=size, spread=SIZE_SPREAD) for name, size in CATEGORY_SIZES.items()
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """A job made concrete: the world stands, nothing has moved yet."""
+
+    scenario: Scenario
+    system: System
+    faults: FaultSet
+    rig: SensorRig
+    world: World
+
+
+def stage(job: Job) -> Stage:
+    """Resolve scenario, faults and rig of a job and build its world. Raises BadInput."""
+    family = load_scenario(job.scenario)
+    scenario = family.resolve(job.seed)
+    faults = faults_of(job, family, scenario)
+    staged = set_stage(family, scenario, job.system, faults, job.seed, job.size_px)
+    where = Where(file=None) if job.faults else family.where.at("faults")
+    faults.check_cameras(tuple(staged.rig.cameras), where)
+    return staged
+
+
+def faults_of(job: Job, family: Family, scenario: Scenario) -> FaultSet:
+    """The scenario's own faults with the job's on top."""
+    own = family.fault_set(scenario)
+    return own.override(parse_fault_arguments(job.faults)) if job.faults else own
+
+
+def set_stage(
+    family: Family,
+    scenario: Scenario,
+    system_name: str,
+    faults: FaultSet,
+    seed: int,
+    size_px: tuple[int, int] | None = None,
+) -> Stage:
+    """Build the world of a concrete scenario's system and read its rig. Raises BadInput."""
+    if system_name not in family.system_names:
+        raise family.where.unknown("system", system_name, family.system_names, ("systems",))
+    system = scenario.system(system_name)
+    declared = family.rig(system.rig)
+    rig = assemble(declared, rig_sensors(declared, family.beside))
+    return Stage(
+        scenario=scenario,
+        system=system,
+        faults=faults,
+        rig=rig if size_px is None else resized(rig, *size_px),
+        world=build_world(scenario, system, seed),
+    )
+
+
+def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captured:
+    """Run the sensors of a staged job."""
+    return capture(staged.system, staged.rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+
+
+@contextmanager
+def pictures(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
+    """Takes pictures for a job whose pipelines read them, else None. Raises `gl.RenderingUnavailable`."""
+    if job.images == "none" or not any(reads_images(name) for name in job.pipelines):
+        yield None
+        return
+    from simbench.sensors.render import Renderer
+
+    pinholes = staged.rig.pinholes
+    with Renderer(staged.world) as renderer:
+        yield lambda motion, camera, t_ns, pose: renderer.rgb(motion, t_ns, pose, pinholes[camera])
