@@ -1,58 +1,40 @@
-"""The ray kernel: nearest hits on MuJoCo's primitive geoms, every group of rays at its own time.
+"""Ray casting in time: nearest hits on MuJoCo's primitive geoms, every ray at its own instant.
 
-A *group* is a set of rays that share an origin and an instant: one LiDAR column, or one tile of an image.
-Per group, geoms are culled by a cone and a wedge around its rays, ordered by distance, and tested
-analytically in float64. Inside starts return the exit, planes are hit from above only: as `mj_ray` does,
-which is the oracle in the tests (ranges equal to 1e-9 m).
-
-All helpers of the kernel live in this file: numba's cache does not notice a change in another file.
+`cast` takes groups of any rays (a group shares an origin and an instant), `cast_pixels` the pixels of one
+camera. `cast_fans` is the fast way for sensors that look along planes: the columns of a spinning LiDAR, the
+rows of a camera. All are analytic in float64. Inside starts return the exit, planes are hit from above only:
+as `mj_ray` does, which is the oracle in the tests (ranges equal to 1e-9 m).
 """
 
 from __future__ import annotations
 
-import inspect
-import os
-import tempfile
-from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, Int64
+from jaxtyping import Bool, Float32, Float64, Int, Int32, Int64
 
 from fusion.geometry import readonly
+from simbench.sensors import ray_kernel as kernel
+from simbench.sensors.compiled import jit as jit
+from simbench.sensors.ray_kernel import BOX as BOX
+from simbench.sensors.ray_kernel import CAPSULE as CAPSULE
+from simbench.sensors.ray_kernel import CYLINDER as CYLINDER
+from simbench.sensors.ray_kernel import ELLIPSOID as ELLIPSOID
+from simbench.sensors.ray_kernel import LANES
+from simbench.sensors.ray_kernel import PLANE as PLANE
+from simbench.sensors.ray_kernel import SPHERE as SPHERE
 
-
-def _writable_cache() -> None:
-    """numba raises at decoration when it can write neither beside this file nor in the home folder."""
-    if "NUMBA_CACHE_DIR" in os.environ or os.access(Path(__file__).parent, os.W_OK):
-        return
-    home_cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    nearest = next((p for p in (home_cache, *home_cache.parents) if p.exists()), None)
-    if nearest is None or not os.access(nearest, os.W_OK):
-        os.environ["NUMBA_CACHE_DIR"] = str(Path(tempfile.gettempdir()) / f"simbench-numba-{os.getuid()}")
-
-
-_writable_cache()
-
-import numba  # noqa: E402  (after the cache folder is known)
-
-PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # as mujoco.mjtGeom
-
-
-def jit(function: Callable[..., Any]) -> Any:
-    """Compile a kernel: the function as written, without the argument checks that tests wrap around it."""
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(inspect.unwrap(function))
+SUN_CELLS = 192  # along either side of the grid of what the sun sees
+BINS_PER_STEP = 2  # of the table that turns a slope into a step of a fan
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Geoms:
     """Primitive geoms, each fixed to a body. Sizes in metres as MuJoCo defines them."""
 
-    kind: Int32[np.ndarray, " g"]
+    kind: Int[np.ndarray, " g"]
     size_m: Float64[np.ndarray, "g 3"]
-    body: Int32[np.ndarray, " g"]
+    body: Int[np.ndarray, " g"]
     rotation: Float64[np.ndarray, "g 3 3"]  # R_body_geom
     position_m: Float64[np.ndarray, "g 3"]  # in the body's frame
     bound_m: Float64[np.ndarray, " g"]  # radius of the bounding sphere; infinite for planes
@@ -98,7 +80,7 @@ def cast(
     range_m = np.full((groups, rays), np.inf)
     geom = np.full((groups, rays), -1, dtype=np.int32)
     cosine = np.zeros((groups, rays), dtype=np.float32)
-    _cast(
+    kernel._cast(
         geoms.kind,
         geoms.size_m,
         geoms.body,
@@ -132,7 +114,7 @@ def cast_pixels(
     shape = (len(x), len(y))
     range_m, geom = np.empty(shape), np.empty(shape, dtype=np.int32)
     cosine = np.empty(shape, dtype=np.float32)
-    _cast_pixels(
+    kernel._cast_pixels(
         geoms.kind,
         geoms.size_m,
         geoms.body,
@@ -153,313 +135,222 @@ def cast_pixels(
     return Hits(range_m=range_m, geom=geom, cosine=cosine)
 
 
-@jit
-def _first_positive(a: float, b: float, c: float) -> tuple[float, float]:
-    """Roots of a t^2 + 2 b t + c, ascending; inf, inf where there is none."""
-    disc = b * b - a * c
-    if disc < 0.0 or a < 1e-300:
-        return np.inf, np.inf
-    root = np.sqrt(disc)
-    return (-b - root) / a, (-b + root) / a
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed:
+    """Geoms in the world over time: still ones once, moving ones at key instants, linear between them.
 
-
-@jit
-def _hit_ellipsoid(o, d, sx, sy, sz, n):  # type: ignore[no-untyped-def]
-    ox, oy, oz = o[0] / sx, o[1] / sy, o[2] / sz
-    dx, dy, dz = d[0] / sx, d[1] / sy, d[2] / sz
-    near, far = _first_positive(
-        dx * dx + dy * dy + dz * dz, ox * dx + oy * dy + oz * dz, ox * ox + oy * oy + oz * oz - 1.0
-    )
-    t = near if near >= 0.0 else far
-    if not (0.0 <= t < np.inf):
-        return np.inf
-    n[0], n[1], n[2] = (ox + t * dx) / sx, (oy + t * dy) / sy, (oz + t * dz) / sz
-    return t
-
-
-@jit
-def _hit_box(o, d, size, n):  # type: ignore[no-untyped-def]
-    near, far = -np.inf, np.inf
-    near_axis, far_axis = 0, 0
-    for i in range(3):
-        if d[i] == 0.0:
-            if abs(o[i]) > size[i]:
-                return np.inf
-            continue
-        inv = 1.0 / d[i]
-        half = abs(inv) * size[i]
-        middle = -o[i] * inv
-        if middle - half > near:
-            near, near_axis = middle - half, i
-        if middle + half < far:
-            far, far_axis = middle + half, i
-    if near > far or far < 0.0:
-        return np.inf
-    n[0], n[1], n[2] = 0.0, 0.0, 0.0
-    if near >= 0.0:
-        n[near_axis] = -1.0 if d[near_axis] > 0 else 1.0
-        return near
-    n[far_axis] = 1.0 if d[far_axis] > 0 else -1.0
-    return far
-
-
-@jit
-def _hit_cylinder(o, d, radius, half, capped, n):  # type: ignore[no-untyped-def]
-    """The tube of a cylinder or capsule, with flat ends where `capped`."""
-    best = np.inf
-    t0, t1 = _first_positive(
-        d[0] * d[0] + d[1] * d[1],
-        o[0] * d[0] + o[1] * d[1],
-        o[0] * o[0] + o[1] * o[1] - radius * radius,
-    )
-    for t in (t0, t1):
-        if 0.0 <= t < best and abs(o[2] + t * d[2]) <= half:
-            best = t
-            n[0], n[1], n[2] = (o[0] + t * d[0]) / radius, (o[1] + t * d[1]) / radius, 0.0
-    if capped and d[2] != 0.0:
-        for side in (-1.0, 1.0):
-            t = (side * half - o[2]) / d[2]
-            if 0.0 <= t < best:
-                x, y = o[0] + t * d[0], o[1] + t * d[1]
-                if x * x + y * y <= radius * radius:
-                    best = t
-                    n[0], n[1], n[2] = 0.0, 0.0, side
-    return best
-
-
-@jit
-def _hit_capsule(o, d, radius, half, n):  # type: ignore[no-untyped-def]
-    best = _hit_cylinder(o, d, radius, half, False, n)
-    for side in (-1.0, 1.0):
-        oz = o[2] - side * half
-        t0, t1 = _first_positive(
-            d[0] * d[0] + d[1] * d[1] + d[2] * d[2],
-            o[0] * d[0] + o[1] * d[1] + oz * d[2],
-            o[0] * o[0] + o[1] * o[1] + oz * oz - radius * radius,
-        )
-        for t in (t0, t1):
-            z = oz + t * d[2]
-            if 0.0 <= t < best and z * side >= 0.0:
-                best = t
-                n[0], n[1], n[2] = (o[0] + t * d[0]) / radius, (o[1] + t * d[1]) / radius, z / radius
-    return best
-
-
-@jit
-def _hit_plane(o, d, size, n):  # type: ignore[no-untyped-def]
-    if d[2] > -1e-15:
-        return np.inf
-    t = -o[2] / d[2]
-    if t < 0.0:
-        return np.inf
-    if size[0] > 0.0 and abs(o[0] + t * d[0]) > size[0]:
-        return np.inf
-    if size[1] > 0.0 and abs(o[1] + t * d[1]) > size[1]:
-        return np.inf
-    n[0], n[1], n[2] = 0.0, 0.0, 1.0
-    return t
-
-
-@jit
-def _hit(kind, size, o, d, n):  # type: ignore[no-untyped-def]
-    if kind == BOX:
-        return _hit_box(o, d, size, n)
-    if kind == CAPSULE:
-        return _hit_capsule(o, d, size[0], size[1], n)
-    if kind == CYLINDER:
-        return _hit_cylinder(o, d, size[0], size[1], True, n)
-    if kind == ELLIPSOID:
-        return _hit_ellipsoid(o, d, size[0], size[1], size[2], n)
-    if kind == SPHERE:
-        return _hit_ellipsoid(o, d, size[0], size[0], size[0], n)
-    return _hit_plane(o, d, size, n)
-
-
-@jit
-def _half_height(kind, size, up):  # type: ignore[no-untyped-def]
-    """Half the extent of a geom along the world's z, given the z row of its rotation; a little generous."""
-    x, y, z = abs(up[0]), abs(up[1]), abs(up[2])
-    if kind == BOX:
-        half = x * size[0] + y * size[1] + z * size[2]
-    elif kind == ELLIPSOID:
-        half = np.sqrt((x * size[0]) ** 2 + (y * size[1]) ** 2 + (z * size[2]) ** 2)
-    elif kind == CAPSULE:
-        half = z * size[1] + size[0]
-    elif kind == CYLINDER:
-        half = z * size[1] + np.sqrt(max(1.0 - z * z, 0.0)) * size[0]
-    elif kind == SPHERE:
-        half = size[0]
-    else:
-        return np.inf
-    return half * (1.0 + 1e-9) + 1e-9
-
-
-@jit
-def _bounds(direction, axis, side):  # type: ignore[no-untyped-def]
-    """Mean direction of a group, a sideways axis, and the cosine and sine that bound its rays."""
-    k = direction.shape[0]
-    axis[:] = 0.0
-    for j in range(k):
-        for i in range(3):
-            axis[i] += direction[j, i]
-    norm = np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-    if norm < 1e-9:
-        return -1.0, 1.0
-    for i in range(3):
-        axis[i] /= norm
-    # The rays of a column spread along first-to-last; sideways is across that.
-    ux, uy, uz = (
-        direction[k - 1, 0] - direction[0, 0],
-        direction[k - 1, 1] - direction[0, 1],
-        direction[k - 1, 2] - direction[0, 2],
-    )
-    side[0] = axis[1] * uz - axis[2] * uy
-    side[1] = axis[2] * ux - axis[0] * uz
-    side[2] = axis[0] * uy - axis[1] * ux
-    norm = np.sqrt(side[0] ** 2 + side[1] ** 2 + side[2] ** 2)
-    cosine, sine = 1.0, 0.0
-    for j in range(k):
-        c = direction[j, 0] * axis[0] + direction[j, 1] * axis[1] + direction[j, 2] * axis[2]
-        cosine = min(cosine, c)
-        if norm > 1e-9:
-            s = abs(direction[j, 0] * side[0] + direction[j, 1] * side[1] + direction[j, 2] * side[2]) / norm
-            sine = max(sine, s)
-    if norm > 1e-9:
-        for i in range(3):
-            side[i] /= norm
-    else:
-        sine = 1.0
-    return cosine, sine
-
-
-@jit
-def _cast_group(  # type: ignore[no-untyped-def]
-    kind, size, body, rotation, position, bound, wanted, body_R, body_p, origin, direction,
-    centre, index, nearest, frame, span, work, out_range, out_geom, out_cosine,
-):  # fmt: skip
-    """One group: rays `direction` [k 3] from `origin`, bodies at body_R [b 3 3], body_p [b 3].
-
-    centre, index, nearest, frame, span, work: scratch. out_*: rows of k. Geoms where `wanted` is False are
-    not there.
+    still [g 12]: rotation row by row, then centre in metres; of a moving geom, at the first key. row [g]: its
+    row in `keys`, -1 for a still one. path_m [t m]: how far any
+    point of each came since the first key, at most.
     """
-    axis, side, o, d, n = work[0], work[1], work[2], work[3], work[4]
-    cosine, sine = _bounds(direction, axis, side)
-    cone_sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
-    count = 0
-    for i in range(kind.shape[0]):
-        if not wanted[i]:
-            continue
-        b = body[i]
-        for r in range(3):
-            centre[i, r] = (
-                body_p[b, r]
-                + body_R[b, r, 0] * position[i, 0]
-                + body_R[b, r, 1] * position[i, 1]
-                + body_R[b, r, 2] * position[i, 2]
-            )
-        cx, cy, cz = centre[i, 0] - origin[0], centre[i, 1] - origin[1], centre[i, 2] - origin[2]
-        distance = np.sqrt(cx * cx + cy * cy + cz * cz)
-        radius = bound[i]
-        near = 0.0
-        if radius < distance:
-            lateral = abs(cx * side[0] + cy * side[1] + cz * side[2])
-            if sine < 1.0 and lateral > (distance + radius) * sine + radius:
-                continue
-            # Distance of the centre from the cone's surface, in the plane through its axis.
-            along = cx * axis[0] + cy * axis[1] + cz * axis[2]
-            across = np.sqrt(max(distance * distance - along * along, 0.0))
-            if cosine > 0.0 and across * cosine - along * cone_sine > radius * (1.0 + 1e-9) + 1e-9:
-                continue
-            near = distance - radius
-        # World orientation of the survivors only, kept in order of distance.
-        for r in range(3):
-            for c in range(3):
-                frame[i, r, c] = (
-                    body_R[b, r, 0] * rotation[i, 0, c]
-                    + body_R[b, r, 1] * rotation[i, 1, c]
-                    + body_R[b, r, 2] * rotation[i, 2, c]
-                )
-        # What the geom spans in height, and how far it reaches: a ray outside that span is not tested.
-        half_height = _half_height(kind[i], size[i], frame[i, 2])
-        span[i, 0], span[i, 1] = cz - half_height, cz + half_height
-        span[i, 2], span[i, 3] = near, distance + radius
-        place = count
-        while place > 0 and nearest[place - 1] > near:
-            nearest[place] = nearest[place - 1]
-            index[place] = index[place - 1]
-            place -= 1
-        nearest[place] = near
-        index[place] = i
-        count += 1
-    for k in range(direction.shape[0]):
-        best = np.inf
-        best_geom = -1
-        best_cosine = 0.0
-        dx, dy, dz = direction[k, 0], direction[k, 1], direction[k, 2]
-        for m in range(count):
-            if nearest[m] > best:
-                break
-            i = index[m]
-            low, high = dz * span[i, 2], dz * span[i, 3]
-            if min(low, high) > span[i, 1] or max(low, high) < span[i, 0]:
-                continue
-            cx, cy, cz = origin[0] - centre[i, 0], origin[1] - centre[i, 1], origin[2] - centre[i, 2]
-            along = -(cx * dx + cy * dy + cz * dz)
-            radius = bound[i]
-            if radius < np.inf:
-                if along < -radius or along - radius > best:
-                    continue
-                if cx * cx + cy * cy + cz * cz - along * along > radius * radius * (1.0 + 1e-9) + 1e-12:
-                    continue
-            for r in range(3):
-                o[r] = frame[i, 0, r] * cx + frame[i, 1, r] * cy + frame[i, 2, r] * cz
-                d[r] = frame[i, 0, r] * dx + frame[i, 1, r] * dy + frame[i, 2, r] * dz
-            hit = _hit(kind[i], size[i], o, d, n)
-            if hit < best or (hit == best and hit < np.inf and i < best_geom):
-                best = hit
-                best_geom = i
-                norm = np.sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2])
-                best_cosine = abs(n[0] * d[0] + n[1] * d[1] + n[2] * d[2]) / norm
-        out_range[k] = best
-        out_geom[k] = best_geom
-        out_cosine[k] = best_cosine
+
+    geoms: Geoms
+    still: Float64[np.ndarray, "g 12"]
+    row: Int64[np.ndarray, " g"]
+    keys: Float64[np.ndarray, "t m 12"]
+    path_m: Float64[np.ndarray, "t m"]
 
 
-@jit
-def _cast(  # type: ignore[no-untyped-def]
-    kind, size, body, rotation, position, bound, body_R, body_p, time_index, origin, direction,
-    out_range, out_geom, out_cosine,
-):  # fmt: skip
-    n = kind.shape[0]
-    wanted = np.ones(n, np.bool_)
-    centre, index, nearest = np.empty((n, 3)), np.empty(n, np.int64), np.empty(n)
-    frame, span, work = np.empty((n, 3, 3)), np.empty((n, 4)), np.empty((5, 3))
-    for g in range(direction.shape[0]):
-        t = time_index[g]
-        _cast_group(
-            kind, size, body, rotation, position, bound, wanted, body_R[t], body_p[t], origin[g],
-            direction[g], centre, index, nearest, frame, span, work, out_range[g], out_geom[g], out_cosine[g],
+def place(
+    geoms: Geoms,
+    body_rotation: Float64[np.ndarray, "t b 3 3"],
+    body_position_m: Float64[np.ndarray, "t b 3"],
+) -> Placed:
+    """Carry every geom to the world at the bodies' poses T_world_body of all keys."""
+    rotation, position = np.ascontiguousarray(body_rotation), np.ascontiguousarray(body_position_m)
+    moves = (rotation != rotation[:1]).any(axis=(0, 2, 3)) | (position != position[:1]).any(axis=(0, 2))
+
+    def carried(which: Int64[np.ndarray, " m"], keys: int) -> tuple[np.ndarray, np.ndarray]:
+        out, path_m = np.empty((keys, len(which), 12)), np.empty((keys, len(which)))
+        kernel._place(
+            geoms.body, geoms.rotation, geoms.position_m, geoms.bound_m, rotation, position, which, out,
+            path_m,
         )  # fmt: skip
+        return out, path_m
+
+    moving = np.flatnonzero(moves[geoms.body])
+    still, _ = carried(np.arange(len(geoms.kind)), 1)
+    keys, path_m = carried(moving, len(rotation))
+    row = np.full(len(geoms.kind), -1, dtype=np.int64)
+    row[moving] = np.arange(len(moving))
+    return Placed(geoms=geoms, still=still[0], row=row, keys=keys, path_m=path_m)
 
 
-@jit
-def _cast_pixels(  # type: ignore[no-untyped-def]
-    kind, size, body, rotation, position, bound, wanted, body_R, body_p, R_world_camera, origin, x, y,
-    out_range, out_geom, out_cosine,
-):  # fmt: skip
-    """One column of pixels is one group: directions R @ (x, y, 1) for the slopes x [c], y [r]."""
-    n, rows = kind.shape[0], y.shape[0]
-    centre, index, nearest = np.empty((n, 3)), np.empty(n, np.int64), np.empty(n)
-    frame, span, work = np.empty((n, 3, 3)), np.empty((n, 4)), np.empty((5, 3))
-    direction = np.empty((rows, 3))
-    for c in range(x.shape[0]):
-        for r in range(rows):
-            norm = 1.0 / np.sqrt(x[c] * x[c] + y[r] * y[r] + 1.0)
-            for i in range(3):
-                direction[r, i] = norm * (
-                    R_world_camera[i, 0] * x[c] + R_world_camera[i, 1] * y[r] + R_world_camera[i, 2]
-                )
-        _cast_group(
-            kind, size, body, rotation, position, bound, wanted, body_R, body_p, origin, direction,
-            centre, index, nearest, frame, span, work, out_range[c], out_geom[c], out_cosine[c],
-        )  # fmt: skip
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fans:
+    """Directions of a sensor as fans: ray j of fan f looks along e + slope u + skew n, frame = (e, u, n).
+
+    frame [f 3 3]: R_sensor_fan, columns e, u, n. slope, skew [f/4 k 4]: of four fans side by side (`packed`);
+    slopes ascend along k. pose [f]: index of each fan's pose. out_at [f], out_stride: where its rays go in
+    the flat result, -1 for padding. low, bins_per_slope, first_step, last_step [f/4 n]: from a slope to the
+    first and last steps that reach it. slack: by how much slopes and skews given to `cast_fans` may differ
+    from these.
+    """
+
+    frame: Float64[np.ndarray, "f 3 3"]
+    slope: Float64[np.ndarray, "g k l"]
+    skew: Float64[np.ndarray, "g k l"]
+    pose: Int64[np.ndarray, " f"]
+    out_at: Int64[np.ndarray, " f"]
+    out_stride: int
+    low: float
+    bins_per_slope: float
+    first_step: Int32[np.ndarray, "g n"]
+    last_step: Int32[np.ndarray, "g n"]
+    skew_max: float
+    slack: float
+
+
+def packed(per_fan: Float64[np.ndarray, "f k"]) -> Float64[np.ndarray, "g k l"]:
+    """Rows of fans, four side by side; the last row repeats where they do not fill up."""
+    padding = -len(per_fan) % LANES
+    rows = np.concatenate([per_fan, np.repeat(per_fan[-1:], padding, axis=0)]) if padding else per_fan
+    return np.ascontiguousarray(rows.reshape(-1, LANES, rows.shape[1]).transpose(0, 2, 1))
+
+
+def make_fans(
+    frame: Float64[np.ndarray, "f 3 3"],
+    slope: Float64[np.ndarray, "f k"],
+    skew: Float64[np.ndarray, "f k"],
+    pose: Int64[np.ndarray, " f"],
+    out_at: Int64[np.ndarray, " f"],
+    out_stride: int,
+    slack: float = 0.0,
+) -> Fans:
+    """Tabulate fans. ValueError: slopes that do not ascend, or that are not finite."""
+    if not (np.isfinite(slope).all() and np.isfinite(skew).all()):
+        raise ValueError("slopes and skews must be finite: a fan spans less than half a turn")
+    if (np.diff(slope, axis=1) < 0.0).any():
+        raise ValueError("the slopes of a fan must ascend")
+    padding = -len(slope) % LANES
+    low, high = float(slope.min()), float(slope.max())
+    bins = BINS_PER_STEP * slope.shape[1] + 1
+    width = max((high - low) / (bins - 1), 1e-9)
+    edges = low + width * np.arange(bins)
+    first = np.array([np.searchsorted(row, edges - 1e-12) for row in slope])
+    last = np.array([np.searchsorted(row, edges + 1e-12, side="right") for row in slope])
+    first[:, 0], last[:, -1] = 0, slope.shape[1]
+
+    def padded(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values, np.repeat(values[-1:], padding, axis=0)])
+
+    return Fans(
+        frame=readonly(padded(frame)),
+        slope=readonly(packed(slope)),
+        skew=readonly(packed(skew)),
+        pose=readonly(padded(pose)),
+        out_at=readonly(np.concatenate([out_at, np.full(padding, -1)])),
+        out_stride=out_stride,
+        low=low,
+        bins_per_slope=1.0 / width,
+        first_step=readonly(padded(first).reshape(-1, LANES, bins).min(axis=1), np.int32),
+        last_step=readonly(padded(last).reshape(-1, LANES, bins).max(axis=1), np.int32),
+        skew_max=float(np.abs(skew).max()),
+        slack=slack,
+    )
+
+
+def cast_fans(
+    placed: Placed,
+    key: Int64[np.ndarray, " p"],
+    weight: Float64[np.ndarray, " p"],
+    R_world_sensor: Float64[np.ndarray, "p 3 3"],
+    origin_m: Float64[np.ndarray, "p 3"],
+    fans: Fans,
+    out: Hits,
+    slope: Float64[np.ndarray, "g k l"] | None = None,
+    skew: Float64[np.ndarray, "g k l"] | None = None,
+) -> None:
+    """Nearest hit of every ray of the fans, into `out` (its arrays seen as flat).
+
+    Pose i of the sensor is R_world_sensor[i], origin_m[i], at the instant between keys key[i] and key[i] + 1
+    of `placed`, `weight[i]` of the way. `slope`, `skew`: packed as the fans', within their slack of them.
+    """
+    geoms = placed.geoms
+    kernel._cast_fans(
+        geoms.kind,
+        geoms.size_m,
+        geoms.bound_m,
+        placed.row,
+        placed.still,
+        placed.keys,
+        placed.path_m,
+        np.ascontiguousarray(key, dtype=np.int64),
+        np.ascontiguousarray(weight, dtype=np.float64),
+        np.ascontiguousarray(R_world_sensor, dtype=np.float64),
+        np.ascontiguousarray(origin_m, dtype=np.float64),
+        fans.pose,
+        fans.frame,
+        fans.slope if slope is None else slope,
+        fans.skew if skew is None else skew,
+        fans.first_step,
+        fans.last_step,
+        fans.low,
+        fans.bins_per_slope,
+        fans.slack,
+        fans.skew_max,
+        fans.out_at,
+        fans.out_stride,
+        0,
+        len(fans.pose),
+        out.range_m.reshape(-1),
+        out.geom.reshape(-1),
+        out.cosine.reshape(-1),
+    )
+
+
+def empty_hits(shape: tuple[int, ...]) -> Hits:
+    """Room for the result of `cast_fans`."""
+    return Hits(
+        range_m=np.empty(shape),
+        geom=np.empty(shape, dtype=np.int32),
+        cosine=np.empty(shape, dtype=np.float32),
+    )
+
+
+def sunlit(
+    placed: Placed,
+    key: Int64[np.ndarray, " p"],
+    weight: Float64[np.ndarray, " p"],
+    R_world_sensor: Float64[np.ndarray, "p 3 3"],
+    origin_m: Float64[np.ndarray, "p 3"],
+    fans: Fans,
+    hits: Hits,
+    toward_sun: Float64[np.ndarray, " 3"],
+) -> Bool[np.ndarray, "..."]:
+    """Whether the sun reaches what each ray of `cast_fans` hit, by one exact shadow ray each; in the hits'
+    shape.
+
+    toward_sun: unit vector, world frame. Where a surface looks away from the sun its own geom does not count:
+    the caller's cosine says so. Geoms are sorted into cells of the plane across the sun's direction, so that
+    a ray meets only those before it.
+    """
+    geoms = placed.geoms
+    a = np.cross(toward_sun, np.eye(3)[np.argmin(np.abs(toward_sun))])
+    a /= np.linalg.norm(a)
+    axes = np.stack([a, np.cross(toward_sun, a), toward_sun])
+    footprint = np.zeros((len(geoms.kind), 8))
+    kernel._sun_footprints(
+        geoms.kind, geoms.size_m, geoms.bound_m, placed.row, placed.still, placed.keys, placed.path_m, axes,
+        footprint,
+    )  # fmt: skip
+    solid = footprint[geoms.kind != PLANE]
+    if len(solid) == 0:
+        return np.ones(hits.geom.shape, dtype=np.bool_)
+    low = (solid[:, :2] - solid[:, 2:4]).min(axis=0)
+    cells_per_m = SUN_CELLS / np.maximum((solid[:, :2] + solid[:, 2:4]).max(axis=0) - low, 1e-6)
+    first = np.zeros(SUN_CELLS * SUN_CELLS + 1, dtype=np.int64)
+    entries = kernel._sun_cells(geoms.kind, footprint, low, cells_per_m, first, np.empty(0, dtype=np.int64))
+    member = np.empty(max(entries, 1), dtype=np.int64)
+    kernel._sun_cells(geoms.kind, footprint, low, cells_per_m, first, member)
+    lit = np.empty(hits.geom.shape, dtype=np.bool_)
+    kernel._sunlit(
+        geoms.kind, geoms.size_m, placed.row, placed.still, placed.keys,
+        np.ascontiguousarray(key, dtype=np.int64), np.ascontiguousarray(weight, dtype=np.float64),
+        np.ascontiguousarray(R_world_sensor, dtype=np.float64),
+        np.ascontiguousarray(origin_m, dtype=np.float64),
+        fans.pose, fans.frame, fans.slope, fans.skew, fans.out_at, fans.out_stride,
+        axes, footprint, low, cells_per_m, first, member,
+        hits.range_m.reshape(-1), hits.geom.reshape(-1), lit.reshape(-1),
+    )  # fmt: skip
+    return lit

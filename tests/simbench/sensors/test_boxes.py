@@ -89,7 +89,7 @@ def view_of(shapes: list[tuple[int, tuple[float, float, float], tuple[float, flo
     geoms = rays.Geoms(
         kind=np.array([s[0] for s in shapes]),
         size_m=np.array([s[1] for s in shapes]),
-        body=np.zeros(len(shapes)),
+        body=np.zeros(len(shapes), np.int32),
         rotation=np.broadcast_to(np.eye(3), (len(shapes), 3, 3)),
         position_m=np.array([s[2] for s in shapes]),
         bound_m=np.array([bound_m(s[0], s[1]) for s in shapes]),

@@ -207,8 +207,9 @@ def test_a_far_shape_is_hit_to_a_billionth_of_its_range(kind: int) -> None:
 @pytest.mark.parametrize("kind", KINDS, ids=NAMES.get)
 def test_a_ray_from_inside_hits_the_far_wall(kind: int) -> None:
     geoms = rays.Geoms(
-        kind=np.array([kind]), size_m=np.array([[2.0, 2.0, 2.0]]), body=np.zeros(1), rotation=np.eye(3)[None],
-        position_m=np.zeros((1, 3)), bound_m=np.array([bound_m(kind, (2.0, 2.0, 2.0))]),
+        kind=np.array([kind]), size_m=np.array([[2.0, 2.0, 2.0]]), body=np.zeros(1, np.int32),
+        rotation=np.eye(3)[None], position_m=np.zeros((1, 3)),
+        bound_m=np.array([bound_m(kind, (2.0, 2.0, 2.0))]),
     )  # fmt: skip
     hits = rays.cast(
         geoms, np.eye(3)[None, None], np.zeros((1, 1, 3)), np.zeros(1, np.int64), np.array([[0.5, 0.0, 0.0]]),
@@ -219,7 +220,7 @@ def test_a_ray_from_inside_hits_the_far_wall(kind: int) -> None:
 
 def test_a_plane_is_hit_from_above_only() -> None:
     geoms = rays.Geoms(
-        kind=np.array([rays.PLANE]), size_m=np.array([[0.0, 0.0, 1.0]]), body=np.zeros(1),
+        kind=np.array([rays.PLANE]), size_m=np.array([[0.0, 0.0, 1.0]]), body=np.zeros(1, np.int32),
         rotation=np.eye(3)[None], position_m=np.zeros((1, 3)), bound_m=np.array([np.inf]),
     )  # fmt: skip
     down_and_up = np.array([[[0.6, 0.0, -0.8], [0.6, 0.0, 0.8]]])
@@ -268,9 +269,9 @@ def test_how_rays_are_grouped_never_changes_what_they_hit(kinds: list[int], seed
 
 def test_of_two_equal_surfaces_the_first_geom_is_hit_whatever_the_group() -> None:
     geoms = rays.Geoms(
-        kind=np.full(2, rays.BOX), size_m=np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 2.0]]), body=np.zeros(2),
-        rotation=np.broadcast_to(np.eye(3), (2, 3, 3)), position_m=np.zeros((2, 3)),
-        bound_m=np.array([np.sqrt(3.0), 3.0]),
+        kind=np.full(2, rays.BOX), size_m=np.array([[1.0, 1.0, 1.0], [1.0, 2.0, 2.0]]),
+        body=np.zeros(2, np.int32), rotation=np.broadcast_to(np.eye(3), (2, 3, 3)),
+        position_m=np.zeros((2, 3)), bound_m=np.array([np.sqrt(3.0), 3.0]),
     )  # fmt: skip
     hits = rays.cast(
         geoms, np.eye(3)[None, None], np.zeros((1, 1, 3)), np.zeros(1, np.int64),
@@ -338,7 +339,7 @@ def test_cosine_and_range_on_a_plane_and_a_sphere_follow_the_closed_form() -> No
     rng = np.random.default_rng(9)
     geoms = rays.Geoms(
         kind=np.array([rays.PLANE, rays.SPHERE]), size_m=np.array([[0.0, 0.0, 1.0], [0.7, 0.0, 0.0]]),
-        body=np.zeros(2), rotation=np.broadcast_to(np.eye(3), (2, 3, 3)),
+        body=np.zeros(2, np.int32), rotation=np.broadcast_to(np.eye(3), (2, 3, 3)),
         position_m=np.array([[0.0, 0.0, 0.0], [6.0, 1.0, 1.5]]), bound_m=np.array([np.inf, 0.7]),
     )  # fmt: skip
     origin, centre = np.array([0.0, 0.0, 1.85]), np.array([6.0, 1.0, 1.5])
@@ -369,6 +370,6 @@ def test_cosine_and_range_on_a_plane_and_a_sphere_follow_the_closed_form() -> No
 def test_a_shape_that_the_kernel_does_not_know_is_refused_with_the_list_of_those_it_does() -> None:
     with pytest.raises(ValueError, match=r"geom types \[7\] cannot be ray-cast; allowed: plane, sphere"):
         rays.Geoms(
-            kind=np.array([7]), size_m=np.ones((1, 3)), body=np.zeros(1), rotation=np.eye(3)[None],
+            kind=np.array([7]), size_m=np.ones((1, 3)), body=np.zeros(1, np.int32), rotation=np.eye(3)[None],
             position_m=np.zeros((1, 3)), bound_m=np.ones(1),
         )  # fmt: skip
