@@ -2,13 +2,14 @@
 """One command sets up `.venv` and runs in it. Standard library only; read by any Python 3.8 or later.
 
     python3 dev.py demo [ARGS]    simbench demo ARGS
-    python3 dev.py run CMD...     any command, in the environment
+    python3 dev.py run CMD...     any command, in the environment (benchmarks: with the rivals)
     python3 dev.py test [ARGS]    pytest ARGS, on all cores
     python3 dev.py check          lock fingerprint, ruff, mypy, import contracts
     python3 dev.py lock [ARGS]    make the locks again; needs uv (ARGS for `uv pip compile`, e.g. --upgrade)
 
-Every package is installed from `requirements.lock` (tools from `requirements-dev.lock`) with its hash
-checked, by uv where it is found, else by pip. What is already installed is not installed again.
+Every package is installed from `requirements.lock` with its hash checked, by uv where it is found, else by
+pip: tools from `requirements-dev.lock`; what benchmarks compare with from `requirements-bench.lock`, for
+scripts under tests/benchmarks only. What is already installed is not installed again.
 """
 
 from __future__ import annotations
@@ -31,6 +32,8 @@ UNFINISHED = os.path.join(VENV, "simbench-installing")
 PYPROJECT = os.path.join(ROOT, "pyproject.toml")
 RUN_LOCK = "requirements.lock"
 DEV_LOCK = "requirements-dev.lock"
+BENCH_LOCK = "requirements-bench.lock"
+BENCHMARKS = os.path.join(ROOT, "tests", "benchmarks")
 OLDEST, NEWEST = (3, 11), (3, 13)
 FINGERPRINT = "# dependencies sha256: "
 EXIT_USAGE, EXIT_SETUP = 2, 3
@@ -198,6 +201,20 @@ def set_up(locks: Sequence[str]) -> None:
         os.close(folder)
 
 
+def is_benchmark(command: Sequence[str]) -> bool:
+    """Does the command name a file under tests/benchmarks?"""
+    folder = os.path.realpath(BENCHMARKS) + os.sep
+    return any(os.path.realpath(word).startswith(folder) and os.path.isfile(word) for word in command)
+
+
+def set_up_rivals() -> None:
+    """Installs what benchmarks compare with. Where that fails they go on without and say so themselves."""
+    try:
+        set_up((RUN_LOCK, BENCH_LOCK))
+    except SystemExit:
+        say("dev.py: going on without the rivals.")
+
+
 def environment() -> dict[str, str]:
     """This process's variables, with `.venv` in front."""
     path = os.path.join(VENV, "bin") + os.pathsep + os.environ.get("PATH", os.defpath)
@@ -238,7 +255,7 @@ def fingerprint() -> str:
 def stale_locks() -> Iterator[str]:
     """A sentence for each lock whose first line is not the fingerprint of pyproject.toml."""
     expected = FINGERPRINT + fingerprint()
-    for lock in (RUN_LOCK, DEV_LOCK):
+    for lock in (RUN_LOCK, DEV_LOCK, BENCH_LOCK):
         with open(os.path.join(ROOT, lock), encoding="utf-8") as file:
             if file.readline().rstrip("\n") != expected:
                 yield f"{lock} was made from other dependencies than pyproject.toml names; run: dev.py lock"
@@ -263,7 +280,7 @@ def compile_lock(lock: str, group: str, arguments: Sequence[str], *, left_out: S
     command += ["--no-header", "--group", group, *arguments, "pyproject.toml"]
     for name in left_out:
         command += ["--no-emit-package", name]
-    if lock == DEV_LOCK:
+    if lock != RUN_LOCK:
         command += ["--constraint", RUN_LOCK]
     subprocess.run([*command, "--output-file", lock], check=True, cwd=ROOT)
     with open(os.path.join(ROOT, lock), encoding="utf-8") as file:
@@ -275,7 +292,7 @@ def lock_all(arguments: Sequence[str]) -> int:
 
     head = f"{FINGERPRINT}{fingerprint()}\n# Made by `python3 dev.py lock` from pyproject.toml.\n"
     run_names: list[str] = []
-    for lock, group in ((RUN_LOCK, "lock"), (DEV_LOCK, "dev")):
+    for lock, group in ((RUN_LOCK, "lock"), (DEV_LOCK, "dev"), (BENCH_LOCK, "bench")):
         try:
             text = compile_lock(lock, group, arguments, left_out=run_names)
             never = pinned(text, marker="sys_platform == 'never'")  # MuJoCo's viewers: see pyproject.toml
@@ -337,6 +354,8 @@ def main(arguments: Sequence[str]) -> int:
         os.chdir(ROOT)
         become(pytest_command(rest))
     set_up((RUN_LOCK,))
+    if verb == "run" and is_benchmark(rest):
+        set_up_rivals()
     become([os.path.join(VENV, "bin", "simbench"), "demo", *rest] if verb == "demo" else rest)
     raise AssertionError("unreachable: become() replaces this process")
 

@@ -286,6 +286,7 @@ def synthetic_run() -> tuple[Calibration, dict[str, CategorySize], tuple[Measure
                 arrival_ns=stamp_ns + 1_000_000,
                 velocity_mps=np.array([5.0, 0.0, 0.0]),
                 rate_radps=np.zeros(3),
+                specific_force_mps2=np.array([0.0, 0.0, 9.81]),
             )
         )
     return calibration, categories, tuple(sorted(messages, key=lambda m: m.arrival_ns))

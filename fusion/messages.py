@@ -82,7 +82,11 @@ class Detections:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EgoMotion:
-    """*Measured* velocity (odometer model) and angular rate (gyro model) in the ego frame."""
+    """*Measured* motion of the ego's body, in its own axes (the ego frame's, at rest).
+
+    velocity_mps: by the odometer. rate_radps: by the gyro. specific_force_mps2: by the accelerometer, its
+    acceleration less gravity where the IMU sits; at rest it reads about (0, 0, 9.81).
+    """
 
     sensor: str
     seq: int
@@ -90,9 +94,10 @@ class EgoMotion:
     arrival_ns: int
     velocity_mps: Float64[np.ndarray, "3"]
     rate_radps: Float64[np.ndarray, "3"]
+    specific_force_mps2: Float64[np.ndarray, "3"]
 
     def __post_init__(self) -> None:
-        _own(self, velocity_mps=np.float64, rate_radps=np.float64)
+        _own(self, velocity_mps=np.float64, rate_radps=np.float64, specific_force_mps2=np.float64)
 
 
 Measurement: TypeAlias = LidarScan | CameraImage | Detections | EgoMotion

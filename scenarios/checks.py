@@ -38,7 +38,7 @@ def check_scenario(
             find("part", actor.part, here.at("actors", actor_name, "part"))
         cameras |= dict.fromkeys(_check_rig(system, here, beside, note))
         _check_actors_stand_apart(system, here, note)
-    faults.check_cameras(tuple(cameras), where.at("faults"))
+    faults.check(tuple(cameras), where.at("faults"))
 
 
 def _check_rig(system: System, where: Where, beside: Path | None, note: str) -> Iterator[str]:

@@ -42,12 +42,8 @@ def load_sensor(name: str, beside: Path | None = None, where: Where = NOWHERE) -
 
 
 def rig_sensors(rig: Rig, beside: Path | None = None) -> dict[str, Sensor]:
-    """The sensors of a rig by their name on it, a mount's `trigger_deg` filled in."""
-    sensors = {name: load_sensor(mount.sensor, beside) for name, mount in rig.sensors.items()}
-    for name, mount in rig.sensors.items():
-        if mount.trigger_deg is not None:
-            sensors[name] = sensors[name].model_copy(update={"trigger_deg": mount.trigger_deg})
-    return sensors
+    """The sensors of a rig by their name on it."""
+    return {name: load_sensor(mount.sensor, beside) for name, mount in rig.sensors.items()}
 
 
 def cameras_of(rig: Rig, beside: Path | None = None) -> tuple[str, ...]:
@@ -109,12 +105,22 @@ def _check_kinds(rig: Rig, sensors: dict[str, Sensor], where: Where) -> None:
 
 def _check_triggers(rig: Rig, sensors: dict[str, Sensor], where: Where) -> None:
     lidar_rate_hz = next(sensor.rate_hz for sensor in sensors.values() if sensor.kind == "lidar")
+    waiting = [name for name, s in sensors.items() if s.kind == "camera" and s.trigger == "lidar_angle"]
+    if rig.pulse_deg is not None and all(rig.sensors[name].trigger_deg is not None for name in waiting):
+        raise where.error("no camera of this rig waits for a pulse", ("pulse_deg",))
     for name, sensor in sensors.items():
-        if sensor.kind != "camera":
-            if rig.sensors[name].trigger_deg is not None:
-                raise where.error("counts for cameras only", ("sensors", name, "trigger_deg"))
-        elif sensor.trigger == "lidar_angle" and sensor.rate_hz != lidar_rate_hz:
+        own_deg = rig.sensors[name].trigger_deg
+        if sensor.kind != "camera" or sensor.trigger != "lidar_angle":
+            if own_deg is not None:
+                raise where.error("counts for triggered cameras only", ("sensors", name, "trigger_deg"))
+            continue
+        if sensor.rate_hz != lidar_rate_hz:
             raise where.error(
                 f"runs at {sensor.rate_hz:g} Hz, the lidar that triggers it at {lidar_rate_hz:g} Hz",
                 ("sensors", name, "sensor"),
+            )
+        if own_deg is None and rig.pulse_deg is None:
+            raise where.error(
+                "waits for a pulse that the rig never sends: give the rig a pulse_deg or it a trigger_deg",
+                ("sensors", name),
             )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from scenarios.errors import BadInput, FieldPath, Where, show
-from scenarios.faults import FAULTS, FaultSpec
+from scenarios.faults import FAULTS, FaultSpec, RoadShake, Vibration
 from scenarios.library import find, names, shown, user_file
 from scenarios.validate import validate
 from scenarios.yaml_source import parse_yaml, read_yaml
@@ -45,8 +45,13 @@ class FaultSet:
         label = change.label if change.clears or change.specs else self.label
         return fault_set({**kept, **{spec.name: spec for spec in change.specs}}, label)
 
-    def check_cameras(self, cameras: Sequence[str], where: Where) -> None:
-        """BadInput: a fault names a camera that is not one of `cameras`."""
+    def check(self, cameras: Sequence[str], where: Where) -> None:
+        """BadInput: a fault names a camera that is not one of `cameras`, or two faults contradict."""
+        if self.get(RoadShake) is not None and self.get(Vibration) is not None:
+            raise where.error(
+                f"{RoadShake.name} and {Vibration.name} both shake the body; switch one off, as in "
+                f"{Vibration.name}=0"
+            )
         for spec in self.specs:
             for name in spec.named_cameras:
                 if name not in cameras:
@@ -104,7 +109,9 @@ def parse_specs(raw: object, where: Where, drawn: Sequence[FieldPath] = ()) -> d
         if isinstance(value, Mapping):
             specs[name] = validate(kind, dict(value), where.at(name), inner, DRAWN)
         elif value is None or isinstance(value, list | tuple | bool):
-            raise where.error(f"must be a number or a mapping, is {show(value)}", (name,))
+            words = kind.strength_words()
+            what = f"one of {', '.join(words)}" if words else "a number"
+            raise where.error(f"must be {what} or a mapping, is {show(value)}", (name,))
         else:
             inner = [(kind.strength,)] if () in inner else []
             specs[name] = validate(kind, {kind.strength: value}, where.at(name), inner, DRAWN)
@@ -124,7 +131,8 @@ def load_fault_set(name_or_path: str) -> FaultChange:
     path = user_file(name_or_path, "fault set")
     if path is None:
         if name_or_path in FAULTS:
-            raise BadInput(f"{OPTION} {name_or_path}: needs a value, as in {name_or_path}=1")
+            some = next(reversed(FAULTS[name_or_path].strength_words()), "1")
+            raise BadInput(f"{OPTION} {name_or_path}: needs a value, as in {name_or_path}={some}")
         known = {*names("fault set"), NONE}
         if name_or_path not in known:
             raise Where(file=OPTION).unknown("fault set", name_or_path, known)

@@ -7,11 +7,11 @@ drawn by the bench from the run's seed. Marks of the sources: data sheet, comput
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, get_args, get_origin
 
 from pydantic import Field, model_validator
 
-from scenarios.scenario import Name, Spec, broken
+from scenarios.scenario import Finite, Name, Spec, broken
 
 Cameras = Literal["cameras"] | tuple[Name, ...]
 """All cameras of the rig, or some by their names."""
@@ -27,6 +27,12 @@ class FaultSpec(Spec):
     strength: ClassVar[str]
     zero_when_off: ClassVar[tuple[str, ...]]
     unit: ClassVar[str]
+
+    @classmethod
+    def strength_words(cls) -> tuple[str, ...]:
+        """The words that the strength may be, weakest first; none where it is a number."""
+        annotation = cls.model_fields[cls.strength].annotation
+        return tuple(get_args(annotation)) if get_origin(annotation) is Literal else ()
 
     @property
     def is_off(self) -> bool:
@@ -91,6 +97,47 @@ class Vibration(FaultSpec):
     profile: Literal["auto", "car", "rider"] = "auto"
 
 
+Roughness = Literal["smooth", "A", "B", "C", "D", "E"]
+"""Classes of ISO 8608, and a road without any roughness."""
+
+
+class RoadEvent(Spec):
+    """One thing on the road, from `at_m` along the ego's path to `length_m` farther on.
+
+    0 lies where the vehicle's origin is at t = 0. `height_m`: of a bump, kerb or seam; depth of a pothole or
+    joint. A single-track vehicle meets the events of either track.
+    """
+
+    kind: Literal["bump", "kerb", "pothole", "joint", "seam"]
+    at_m: Finite
+    height_m: Annotated[float, Field(gt=0, le=0.3, allow_inf_nan=False)]
+    length_m: Annotated[float, Field(ge=0.01, le=50, allow_inf_nan=False)]
+    track: Literal["left", "right", "both"] = "both"
+
+
+class RoadShake(FaultSpec):
+    """The ego drives over a rough road: what its body does is integrated, not scripted.
+
+    The car on its suspension, or the e-scooter with its rider, drives along the scripted path over an
+    ISO 8608 road of class `roughness`, drawn from the run's seed, and over `events`. The body's roll, pitch
+    and heave carry all sensors. Stands instead of motion.vibration_deg, never beside it.
+    Unit: ISO 8608 class. Source: classes by the standard; vehicle and rider judgement within what is usual.
+    """
+
+    name: ClassVar[str] = "motion.road"
+    strength: ClassVar[str] = "roughness"
+    zero_when_off: ClassVar[tuple[str, ...]] = ()
+    unit: ClassVar[str] = "ISO 8608 class"
+
+    roughness: Roughness = "smooth"
+    events: tuple[RoadEvent, ...] = Field(default=(), max_length=100)
+
+    @property
+    def is_off(self) -> bool:
+        """A smooth road without events shakes nothing."""
+        return self.roughness == "smooth" and not self.events
+
+
 class Flex(FaultSpec):
     """Each camera's bracket bends against the body, independently of the others.
 
@@ -147,6 +194,6 @@ class EdgeError(FaultSpec):
 
 
 FAULTS: dict[str, type[FaultSpec]] = {
-    spec.name: spec for spec in (CalibrationRotation, EdgeError, Flex, Vibration, TriggerOffset)
+    spec.name: spec for spec in (CalibrationRotation, EdgeError, Flex, RoadShake, Vibration, TriggerOffset)
 }
 """Every fault by its name, sorted."""

@@ -14,6 +14,7 @@ from pydantic_core import PydanticCustomError
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Drawn = NonNegative | tuple[NonNegative, NonNegative]  # a number, or low and high: drawn once a run
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=64)]
 Category = Literal["car", "rider", "pedestrian", "tree", "post", "building", "board"]
 
@@ -36,6 +37,20 @@ class Spec(BaseModel):
 def broken(problem: str, *field: str | int) -> PydanticCustomError:
     """A broken rule about `field` (a path within the model), to be raised in a validator."""
     return PydanticCustomError("rule", "{problem}", {"problem": problem, "field": field})
+
+
+def ends(value: float | tuple[float, float]) -> tuple[float, float]:
+    """Least and largest value of a `Drawn` number."""
+    return value if isinstance(value, tuple) else (value, value)
+
+
+def check_drawn(value: float | tuple[float, float], field: str, most: float, what: str) -> None:
+    """Broken rule: the ends do not ascend, or the larger is above `most`, which is called `what`."""
+    low, high = ends(value)
+    if low > high:
+        raise broken("must be low, high with low <= high", field)
+    if high > most:
+        raise broken(f"is more than {what}", field)
 
 
 class Path(Spec):
@@ -164,15 +179,34 @@ class Pose(Spec):
 
 
 class ReturnNoise(Spec):
-    """Range noise, 1 SD in metres, at high, medium and low return strength; interpolated between them."""
+    """Range noise, 1 SD in metres, at high, medium and low return strength; interpolated between them.
+
+    Strength is the signal in multiples of the weakest that is detected; low is at 1.
+    """
 
     high_m: NonNegative
     medium_m: NonNegative
     low_m: NonNegative
+    high_strength: Annotated[float, Field(gt=1, allow_inf_nan=False)] = 16.0
+    medium_strength: Annotated[float, Field(gt=1, allow_inf_nan=False)] = 4.0
+
+    @model_validator(mode="after")
+    def _strengths_ascend(self) -> ReturnNoise:
+        if self.high_strength <= self.medium_strength:
+            raise broken("must be above medium_strength", "high_strength")
+        return self
+
+
+LidarEffect = Literal[
+    "divergence", "range_law", "range_noise", "resolution", "angle_noise", "dropout", "false_positives"
+]
 
 
 class LidarSensor(Spec):
-    """A spinning LiDAR. Azimuth offsets are of each beam against the column's encoder angle."""
+    """A spinning LiDAR. Azimuth offsets are of each beam against the encoder angle at its own firing.
+
+    Every number says what its effect is when it acts; `off` switches effects off by name.
+    """
 
     kind: Literal["lidar"]
     rate_hz: Positive
@@ -181,6 +215,8 @@ class LidarSensor(Spec):
     start_azimuth_deg: Finite  # where a sweep starts, in the LiDAR frame
     elevation_deg: tuple[Finite, ...]
     azimuth_offset_deg: tuple[Finite, ...]
+    column_us: Positive | None = None  # from one column to the next; None: equal shares of the turn
+    fire_delay_us: tuple[NonNegative, ...] = ()  # of each beam after its column's first; empty: all at once
     min_range_m: NonNegative
     range_at_10_percent_m: Positive  # farthest return of a 10 % reflecting target
     range_at_80_percent_m: Positive
@@ -188,7 +224,11 @@ class LidarSensor(Spec):
     noise: ReturnNoise
     angle_noise_deg: NonNegative
     false_positive_rate: Annotated[float, Field(ge=0, le=1)]
+    divergence_deg: tuple[NonNegative, NonNegative] = (0.0, 0.0)  # FWHM of the beam: across, and up
+    merge_m: NonNegative = 0.0  # parts of a return nearer to each other than this are one return
+    dropout_rate: Annotated[float, Field(ge=0, le=1)] = 0.0  # share of returns lost whatever their strength
     latency_ms: NonNegative  # from the last firing to the delivery
+    off: tuple[LidarEffect, ...] = ()
     source: str
 
     @model_validator(mode="after")
@@ -205,12 +245,51 @@ class LidarSensor(Spec):
             raise broken("must not be below range_at_10_percent_m", "range_at_80_percent_m")
         if self.min_range_m >= self.range_at_10_percent_m:
             raise broken("must be below range_at_10_percent_m", "min_range_m")
+        if max(self.divergence_deg) > 10.0:
+            raise broken("must be at most 10 degrees", "divergence_deg")
+        if max(self.divergence_deg) > 0.0 and self.merge_m == 0.0:
+            raise broken("must be above 0 for a beam with divergence_deg", "merge_m")
+        return self
+
+    @model_validator(mode="after")
+    def _firings_fit(self) -> LidarSensor:
+        beams, delays = len(self.elevation_deg), len(self.fire_delay_us)
+        turn_us = 1e6 / self.rate_hz
+        column_us = turn_us / self.columns if self.column_us is None else self.column_us
+        if self.columns * column_us > turn_us * (1.0 + 1e-9):
+            raise broken(f"makes {self.columns} columns longer than a turn of {turn_us:g} us", "column_us")
+        if delays not in (0, beams):
+            raise broken(f"has {delays} values for {beams} beams", "fire_delay_us")
+        if delays and min(self.fire_delay_us) > 0.0:
+            raise broken("must be 0 for the beam that fires first", "fire_delay_us")
+        for i, delay in enumerate(self.fire_delay_us):
+            if delay >= column_us:
+                raise broken(f"is not below the {column_us:g} us from column to column", "fire_delay_us", i)
         return self
 
 
+class ImageNoise(Spec):
+    """Shot and read noise of an image. White stands for full_well_e / gain electrons."""
+
+    full_well_e: Positive
+    read_noise_e: NonNegative
+    gain: Positive = 1.0  # above 1: less light, so fewer electrons make the same brightness
+
+
 class CameraSensor(Spec):
-    """A camera. `trigger`: `lidar_angle` exposes when the spinning LiDAR passes `trigger_deg` (in its frame);
-    `free_run` exposes on its own at `rate_hz`, its phase drawn by seed within ±`phase_ms` of that instant."""
+    """A camera. All of its times without faults; what its stamp means is its `stamp`.
+
+    trigger: `lidar_angle` starts to expose `delay_ms` after the rig's pulse; `free_run` exposes on its own at
+    `rate_hz`, the first time at `phase_ms` after time 0 (the first firing of the LiDAR's first sweep).
+    shutter: `global` exposes all rows at once, `rolling` one after the other from the top; the last row
+    starts `readout_ms` after the first.
+    stamp, what the image's stamp claims: `trigger` the pulse; `exposure_start` the first row begins;
+    `mid_exposure` the middle of the middle row; `end_of_readout` the last row ends; `arrival` the host has
+    the image, `stamp_delay_ms` after mid-exposure, and later in every frame by an exponentially distributed
+    wait of SD `stamp_jitter_ms`. Images do not overtake each other.
+    latency_ms: to the delivery of the detections, from the end of the read-out, or from the host's having the
+    image where the stamp is its arrival.
+    """
 
     kind: Literal["camera"]
     rate_hz: Positive
@@ -219,36 +298,78 @@ class CameraSensor(Spec):
     fov_deg: Annotated[float, Field(gt=1, lt=170)]  # horizontal
     distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
     monochrome: bool = False
+    exposure: Positive = 1.0  # brightness: linear light is multiplied by it
+    motion_blur_samples: Annotated[int, Field(ge=1, le=33)] = 1  # instants averaged over exposure_ms; 1: none
+    noise: ImageNoise | None = None
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] | None = None
     trigger: Literal["lidar_angle", "free_run"]
-    trigger_deg: Finite = 0.0
-    phase_ms: NonNegative = 0.0
+    delay_ms: NonNegative = 0.0
+    phase_ms: Drawn = 0.0
     exposure_ms: NonNegative
-    stamp: Literal["mid_exposure", "trigger", "arrival"]
-    latency_ms: NonNegative  # from mid-exposure to the delivery of the detections
+    shutter: Literal["global", "rolling"] = "global"
+    readout_ms: NonNegative = 0.0
+    stamp: Literal["trigger", "exposure_start", "mid_exposure", "end_of_readout", "arrival"]
+    stamp_delay_ms: Drawn = 0.0
+    stamp_jitter_ms: Drawn = 0.0
+    latency_ms: NonNegative
     source: str
+
+    @model_validator(mode="after")
+    def _imaging_fits(self) -> CameraSensor:
+        if self.motion_blur_samples % 2 == 0:
+            raise broken("must be odd: one of them is the middle of the exposure", "motion_blur_samples")
+        if self.motion_blur_samples > 1 and self.exposure_ms == 0.0:
+            raise broken("needs an exposure_ms above 0", "motion_blur_samples")
+        return self
 
     @model_validator(mode="after")
     def _timing_fits(self) -> CameraSensor:
         period_ms = 1e3 / self.rate_hz
         if self.exposure_ms > period_ms:
             raise broken(f"is longer than a period of {period_ms:g} ms", "exposure_ms")
-        if self.phase_ms > 0.5 * period_ms:
-            raise broken(f"is more than half a period of {period_ms:g} ms", "phase_ms")
+        if self.shutter == "global" and self.readout_ms != 0.0:
+            raise broken("counts for a rolling shutter only", "readout_ms")
+        if self.shutter == "rolling" and self.readout_ms == 0.0:
+            raise broken("a rolling shutter needs a read-out time above 0", "readout_ms")
+        if self.exposure_ms + self.readout_ms > period_ms:
+            taken = f"{self.exposure_ms:g} ms of exposure and {self.readout_ms:g} ms of read-out"
+            raise broken(f"{taken} are longer than a period of {period_ms:g} ms", "readout_ms")
         if self.trigger == "lidar_angle" and self.phase_ms != 0.0:
             raise broken("counts for trigger free_run only", "phase_ms")
+        if self.trigger == "free_run" and self.delay_ms != 0.0:
+            raise broken("counts for trigger lidar_angle only", "delay_ms")
+        if self.delay_ms > period_ms:
+            raise broken(f"is more than a period of {period_ms:g} ms", "delay_ms")
         if self.trigger == "free_run" and self.stamp == "trigger":
             raise broken("a free running camera has no trigger to stamp", "stamp")
+        check_drawn(self.phase_ms, "phase_ms", period_ms, f"a period of {period_ms:g} ms")
+        self._stamp_fits()
         return self
+
+    def _stamp_fits(self) -> None:
+        delay, jitter = self.stamp_delay_ms, self.stamp_jitter_ms
+        for field, value in (("stamp_delay_ms", delay), ("stamp_jitter_ms", jitter)):
+            check_drawn(value, field, 1000.0, "1000 ms")
+            if self.stamp != "arrival" and value != 0.0:
+                raise broken("counts for stamp arrival only", field)
+        read_ms = 0.5 * (self.exposure_ms + self.readout_ms)
+        if self.stamp == "arrival" and ends(delay)[0] < read_ms:
+            raise broken(
+                f"the host has no image before it is read out, {read_ms:g} ms after mid-exposure",
+                "stamp_delay_ms",
+            )
 
 
 class GnssSensor(Spec):
     """RTK receivers on ego and target. Bias is drawn once a pass, noise each fix (both 1 SD, per axis).
 
-    The ego's antenna is where the rig mounts this sensor.
+    The ego's antenna is where the rig mounts this sensor. Both receivers measure together, the first time at
+    `phase_ms` after time 0; a fix is stamped with that instant and known `latency_ms` later.
     """
 
     kind: Literal["gnss"]
     rate_hz: Positive
+    phase_ms: Drawn = 0.0
     bias_m: NonNegative
     noise_m: NonNegative
     latency_ms: NonNegative
@@ -256,18 +377,48 @@ class GnssSensor(Spec):
     target_lever_m: tuple[Finite, Finite, Finite]  # antenna against the box centre, target's frame
     source: str
 
+    @model_validator(mode="after")
+    def _phase_fits(self) -> GnssSensor:
+        period_ms = 1e3 / self.rate_hz
+        check_drawn(self.phase_ms, "phase_ms", period_ms, f"a period of {period_ms:g} ms")
+        return self
+
 
 class ImuSensor(Spec):
-    """Gyro on the ego's body, and the wheel odometer that comes with it."""
+    """Gyro and accelerometer on the ego's body, and the wheel odometer that comes with them.
+
+    Both read at `rate_hz`, the first time at `phase_ms` after time 0; the message is stamped with that
+    instant and delivered `latency_ms` later. Noise is white, given as a density (per square root of hertz);
+    a bias is drawn once a run (1 SD, per axis) and wanders as a random walk (per square root of seconds). The
+    odometer samples at its own rate and phase; a message holds its newest sample that is at least
+    `odometer_latency_ms` old.
+    """
 
     kind: Literal["imu"]
     rate_hz: Positive
+    phase_ms: Drawn = 0.0
     gyro_noise_dps_rthz: NonNegative
     gyro_bias_dps: NonNegative
+    gyro_walk_dps_rts: NonNegative
+    accel_noise_mps2_rthz: NonNegative
+    accel_bias_mps2: NonNegative
+    accel_walk_mps2_rts: NonNegative
+    odometer_rate_hz: Positive
+    odometer_phase_ms: Drawn = 0.0
+    odometer_latency_ms: NonNegative
     odometer_scale_error: NonNegative  # 1 SD, relative, constant over a run
     odometer_step_mps: NonNegative
     latency_ms: NonNegative
     source: str
+
+    @model_validator(mode="after")
+    def _phases_fit(self) -> ImuSensor:
+        for field, phase_ms, rate_hz in (
+            ("phase_ms", self.phase_ms, self.rate_hz),
+            ("odometer_phase_ms", self.odometer_phase_ms, self.odometer_rate_hz),
+        ):
+            check_drawn(phase_ms, field, 1e3 / rate_hz, f"a period of {1e3 / rate_hz:g} ms")
+        return self
 
 
 Sensor = LidarSensor | CameraSensor | GnssSensor | ImuSensor
@@ -293,7 +444,7 @@ class DetectorSpec(Spec):
 
 
 class Mount(Spec):
-    """A sensor file on a rig. `trigger_deg` (cameras only) overrides the sensor file's."""
+    """A sensor file on a rig. `trigger_deg`: a triggered camera's own spin angle, not the rig's pulse."""
 
     sensor: Name  # a file of scenarios/sensors
     pose: Pose
@@ -304,13 +455,15 @@ class Rig(Spec):
     """Sensors by their name on the rig; exactly one LiDAR, which stands above the ego frame's origin.
 
     `body` says whose shake the rig follows. `ego_origin_m`: where the ego frame's origin lies on the carrying
-    part: metres forward and left of the part's own origin.
+    part: metres forward and left of the part's own origin. `pulse_deg`: the LiDAR is master; when its spin
+    passes this angle (in its frame, at the encoder), one pulse fires all triggered cameras.
     """
 
     name: Name
     description: str
     body: Literal["vehicle", "rider"]
     ego_origin_m: tuple[Finite, Finite] = (0.0, 0.0)
+    pulse_deg: Finite | None = None
     sensors: dict[Name, Mount]
     detector: DetectorSpec = DetectorSpec()
     source: str

@@ -15,10 +15,12 @@ Profile = Literal["car", "rider"]
 
 @dataclass(frozen=True, kw_only=True)
 class Severity:
-    """What severities 1 to 5 of a fault mean. `profile`: the body it holds for (None: both)."""
+    """What severities 1 to 5 of a fault mean, as numbers or words. `profile`: the body it holds for (None:
+    both).
+    """
 
     fault: str
-    values: tuple[float, float, float, float, float]
+    values: tuple[float, float, float, float, float] | tuple[str, str, str, str, str]
     profile: Profile | None
     source: str
 
@@ -41,6 +43,12 @@ SEVERITIES = (
         values=(0.02, 0.05, 0.1, 0.2, 0.5),
         profile=None,
         source="judgement",
+    ),
+    Severity(
+        fault="motion.road",
+        values=("A", "B", "C", "D", "E"),
+        profile=None,
+        source="classes of ISO 8608",
     ),
     Severity(
         fault="motion.vibration_deg",

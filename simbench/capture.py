@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import UInt8
 
-from fusion.geometry import Transform
 from fusion.messages import CameraImage, CategorySize, Detections, LidarScan, Measurement
 from scenarios.fault_set import FaultSet
 from scenarios.scenario import System
@@ -18,13 +16,16 @@ from simbench.motion import Motion, at
 from simbench.recording import Recording
 from simbench.sensors import gnss, imu, lidar
 from simbench.sensors.boxes import View, true_box
+from simbench.sensors.clock import CameraTiming
 from simbench.sensors.detector import Detector
-from simbench.sensors.rig import CameraTiming, SensorRig
+from simbench.sensors.pictures import TakePicture
+from simbench.sensors.rig import SensorRig
+from simbench.sensors.row_view import RowView
+from simbench.sensors.rows import exposure_at, row_times_ns
 from simbench.truth import GnssReference, ImageTruth, ScanTruth, TrueBox, Truth
 from simbench.world import World
 
 FARTHEST_BOX_M = 90.0
-TakePicture = Callable[[Motion, str, int, Transform], UInt8[np.ndarray, "h w 3"]]
 
 
 def set_in_motion(world: World, rig: SensorRig, ego_name: str, drawn: Drawn | None) -> Motion:
@@ -63,12 +64,12 @@ def capture(
     picture: TakePicture | None = None,
     ideal: bool = False,
 ) -> Captured:
-    """Run all sensors over the system's duration. `picture` renders an image (motion, camera, true time, true
-    pose) or is None for no images; boxes and scores do not depend on it. `ideal` switches the sensors' own
-    noise off.
+    """Run all sensors over the system's duration. `picture` takes an image (motion, camera, count, true
+    mid-exposure) or is None for no images; boxes and scores do not depend on it. `ideal` switches the
+    sensors' own noise off.
     """
     timing = {name: rig.timing(name, system.duration_s, seed) for name in rig.cameras}
-    drawn = draw(rig, world, faults, timing, system.duration_s, seed)
+    drawn = draw(rig, world, faults, timing, system, seed)
     motion = set_in_motion(world, rig, system.ego, drawn)
     messages: list[Measurement] = []
     scans: list[ScanTruth] = []
@@ -83,10 +84,9 @@ def capture(
             messages += delivered
             images.append(image_truth)
     period_ns = lidar.period_ns(rig.lidar)
-    last_ns = max((int(t.mid_ns[-1]) for t in timing.values()), default=0)
-    end_ns = max(last_ns, len(scans) * period_ns) + 300_000_000
+    end_ns = rig.end_ns(system.duration_s, timing)
     if rig.imu is not None and rig.imu_name is not None:
-        messages += imu.measure(rig.imu_name, rig.imu, motion, end_ns, stream(seed, "imu"))
+        messages += imu.measure(rig.imu_name, rig.imu, motion, end_ns, stream(seed, "imu"), rig.phases(seed))
     target_id = None if system.target is None else world.find(system.target).object_id
     return Captured(
         recording=Recording(
@@ -130,24 +130,29 @@ def _shots(
     picture: TakePicture | None,
 ) -> Iterator[tuple[list[Measurement], ImageTruth]]:
     """What one camera delivers for each exposure: detections, and the image where pictures are taken."""
-    camera, world = rig.cameras[name], motion.world
+    world, pinhole = motion.world, rig.pinholes[name]
+    by_rows = timing.line_delay_ns != 0.0 or any(pinhole.distortion)
     taken_ns = timing.mid_ns + drawn.delays_ns.get(name, 0)
     edge_errors = dict(drawn.edge_errors.get(name, {}))
-    detector = Detector(
-        rig.rig.detector, name, rig.pinholes[name], world.objects, len(taken_ns), seed, edge_errors
-    )
+    detector = Detector(rig.rig.detector, name, pinhole, world.objects, len(taken_ns), seed, edge_errors)
     poses, (rotation, position) = motion.sensor(name, taken_ns), motion.poses(taken_ns)
     for seq, capture_ns in enumerate(int(t) for t in taken_ns):
         T_world_camera = at(poses, seq)
-        view = View(world.geoms, rotation[seq], position[seq], T_world_camera, rig.pinholes[name])
+        view: View
+        if by_rows:
+            t_ns = row_times_ns(capture_ns, timing.line_delay_ns, pinhole.height_px)
+            view = RowView(exposure_at(motion, name, t_ns), pinhole)
+        else:
+            view = View(world.geoms, rotation[seq], position[seq], T_world_camera, pinhole)
         boxes = _boxes_in(view, world, rig.rig.detector.categories, ego)
         detected = detector.detect(seq, boxes)
-        stamp_ns, arrival_ns = int(timing.stamp_ns[seq]), capture_ns + round(camera.latency_ms * 1e6)
+        late_ns = capture_ns - int(timing.mid_ns[seq])
+        stamp_ns, arrival_ns = int(timing.stamp_ns[seq]), int(timing.arrival_ns[seq]) + late_ns
         delivered: list[Measurement] = [
             Detections(sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, boxes=detected.boxes)
         ]
         if picture is not None:
-            rgb = picture(motion, name, capture_ns, T_world_camera)
+            rgb = picture(motion, name, seq, capture_ns)
             delivered.append(
                 CameraImage(sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, rgb=rgb)
             )
@@ -170,7 +175,8 @@ def _reference(
     if rig.gnss is None or rig.gnss_name is None or target_id is None:
         return None
     antenna = rig.T_ego_sensor[rig.gnss_name].translation_m
-    return gnss.reference(rig.gnss, antenna, motion, target_id, end_ns, stream(seed, "gnss"))
+    phase_ns = rig.phases(seed).gnss_ns
+    return gnss.reference(rig.gnss, antenna, motion, target_id, end_ns, stream(seed, "gnss"), phase_ns)
 
 
 def in_order_of_arrival(messages: list[Measurement]) -> tuple[Measurement, ...]:
@@ -185,16 +191,15 @@ def in_order_of_arrival(messages: list[Measurement]) -> tuple[Measurement, ...]:
 
 def _boxes_in(view: View, world: World, categories: tuple[str, ...], ego: str) -> tuple[TrueBox, ...]:
     """True boxes of all detectable objects near enough, in order of object id; the ego itself is not one."""
+    wanted = [o.object_id for o in world.objects if o.category in categories and o.name != ego]
+    first = np.array(world.first_geom, dtype=np.int64)[wanted]
+    # Every geom of an object lies within its size of any other one's centre.
+    reach_m = np.array([np.linalg.norm(world.objects[i].size_m) for i in wanted])
+    shown = view.may_show(first, reach_m)
+    shown &= np.linalg.norm(view.centre_camera_m[first], axis=1) <= FARTHEST_BOX_M + reach_m
     result = []
-    for info in world.objects:
-        if info.category not in categories or info.name == ego:
-            continue
-        mask = world.masks[info.object_id]
-        centre_m = view.centre_camera_m[world.first_geom[info.object_id]]
-        reach_m = float(np.linalg.norm(info.size_m))  # every geom lies within this of any other one's centre
-        if np.linalg.norm(centre_m) > FARTHEST_BOX_M + reach_m or not view.may_show(centre_m, reach_m):
-            continue
-        box = true_box(view, info.object_id, mask, min_height_px=4.0)
+    for object_id, may_show in zip(wanted, shown, strict=True):
+        box = true_box(view, object_id, world.masks[object_id], min_height_px=4.0) if may_show else None
         if box is not None:
             result.append(box)
     return tuple(result)

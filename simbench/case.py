@@ -15,6 +15,7 @@ from simbench.score.metrics import METRICS, Row
 from simbench.score.score import Scores
 
 ORACLE = "oracle"
+Images = Literal["none", "raycast", "gl"]
 Status = Literal["ok", "pipeline_error", "timeout", "bench_error", "receipt_mismatch"]
 
 
@@ -28,7 +29,7 @@ class Job:
     seed: int
     pipelines: tuple[str, ...]
     faults: tuple[str, ...] = ()
-    images: Literal["none", "gl"] = "none"
+    images: Images = "none"
     size_px: tuple[int, int] | None = None
 
 

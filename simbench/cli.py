@@ -1,4 +1,4 @@
-"""The command line: `simbench demo | run | list | describe | doctor | learn`.
+"""The command line: `simbench demo | run | list | describe | timeline | doctor | learn`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
-    from simbench.case import Job, JobResult
+    from simbench.case import Images, Job, JobResult
 
 BASELINES = ("static_projection", "static_projection_ground", "probabilistic")
 FAILED, BAD_INPUT, BENCH_ERROR, NOTHING = 1, 2, 3, 5
@@ -88,7 +88,11 @@ def _common(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]
     options = (
         click.option("--seeds", default="0-1", callback=_seeds, help="Runs to make: 0-3 or 0,2,5."),
         click.option(
-            "--images", type=click.Choice(["none", "gl"]), default="gl", help="Render pictures, or not."
+            "--images",
+            type=click.Choice(["none", "raycast", "gl"]),
+            default="raycast",
+            show_default=True,
+            help="Take pictures by rays, by OpenGL, or not at all.",
         ),
         click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores)."),
         click.option(
@@ -114,7 +118,7 @@ def _common(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]
 @_common("out/demo")
 def demo(
     seeds: tuple[int, ...],
-    images: str,
+    images: Images,
     jobs: int | None,
     out: Path,
     as_json: bool,
@@ -129,7 +133,7 @@ def demo(
     planned = [
         Job(
             scenario="overtake-approach", system=system, seed=seed, pipelines=BASELINES, faults=(faults,),
-            images="gl" if images == "gl" and faults == "demo" else "none", size_px=size,
+            images=images if faults == "demo" else "none", size_px=size,
         )
         for system in ("car", "wearable")
         for seed in seeds
@@ -152,7 +156,7 @@ def demo(
 @_common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...], alone: bool,
-    seeds: tuple[int, ...], images: str, jobs: int | None, out: Path, as_json: bool,
+    seeds: tuple[int, ...], images: Images, jobs: int | None, out: Path, as_json: bool,
     size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
     """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
@@ -183,7 +187,7 @@ def run(
             for seed in seeds:
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
-                    images="gl" if images == "gl" else "none", size_px=size,
+                    images=images, size_px=size,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
@@ -192,7 +196,7 @@ def run(
     _execute(planned, out, images, jobs, as_json)
 
 
-def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as_json: bool) -> None:
+def _execute(planned: list[Job], out: Path, images: Images, workers: int | None, as_json: bool) -> None:
     """Check every job before any runs, run them, write everything, exit by the worst status."""
     import json
     import os
@@ -215,8 +219,8 @@ def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as
     where = environment(images)
     content = result_files.write(found, out, where)
     command = "simbench " + " ".join(_quoted(word) for word in sys.argv[1:])
-    if images == "gl":
-        _video(found, out)
+    if images != "none":
+        _video(found, out, images)
     page = write_report(found, out, command=command, images=images, environment=where)
     if as_json:
         click.echo(json.dumps(content, indent=1, allow_nan=False))
@@ -230,13 +234,13 @@ def _execute(planned: list[Job], out: Path, images: str, workers: int | None, as
         raise SystemExit(FAILED)
 
 
-def _video(found: tuple[JobResult, ...], out: Path) -> None:
+def _video(found: tuple[JobResult, ...], out: Path, images: Images) -> None:
     """One video: the first recording with a target, one with faults if there is one."""
     from simbench.report.video import write_video
 
     shown = [r for r in found if r.views and all(c.status == "ok" for c in r.cases)]
     for result in sorted(shown, key=lambda r: len(r.faults) == 0)[:1]:
-        write_video(result, out)
+        write_video(result, out, images)
 
 
 class _Progress:
@@ -358,6 +362,47 @@ def describe(name: str, seed: int) -> None:
     from scenarios.load import load_scenario
 
     click.echo(text(load_scenario(name).resolve(seed)), nl=False)
+
+
+@main.command()
+@click.argument("target", metavar="RUN|SCENARIO")
+@click.option("--system", type=click.Choice(["car", "wearable"]), help="Which rig (default: the first).")
+@click.option("--seed", type=click.IntRange(0), help="Which of the family (default: 0, or a run's first).")
+@click.option(
+    "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE",
+    help="In place of or on top of those of the run or scenario; 'none' clears. May be repeated.",
+)  # fmt: skip
+@click.option("--at", "at_s", type=float, default=0.2, show_default=True, help="Seconds into the run.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("out/timeline"),
+    show_default=True,
+    help="Folder for the picture.",
+)
+def timeline(
+    target: str, system: str | None, seed: int | None, faults: tuple[str, ...], at_s: float, out: Path
+) -> None:
+    """Draw when every sensor measures, what its stamps claim and when it delivers, over two sweeps.
+
+    Of a scenario (name or .yaml file) or of the folder of a run. The table says how far the LiDAR's firing
+    along each camera's axis is from the camera's exposure and from its stamp.
+
+    Example: simbench timeline overtake-approach --system wearable
+    """
+    from rich.console import Console
+
+    from simbench.files import prepare_folder, write_text
+    from simbench.report.timeline import svg
+    from simbench.report.timeline_text import text
+    from simbench.timeline import timeline as read
+
+    found = read(target, system, seed, faults, at_s)
+    prepare_folder(out)
+    console = Console()
+    console.print(text(found, console.width))
+    write_text(out / "timeline.svg", svg(found))
+    click.echo(f"\npicture: {out / 'timeline.svg'}")
 
 
 @main.command()

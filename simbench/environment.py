@@ -13,7 +13,7 @@ PACKAGES = ("simbench", "mujoco", "numpy", "scipy", "opencv-python-headless", "n
 
 def environment(images: str) -> dict[str, object]:
     """Plain data for `result.json` and the report's footer."""
-    renderer = "none"
+    renderer = {"none": "none", "raycast": "rays, without OpenGL"}.get(images, images)
     if images == "gl":
         from simbench.sensors import gl
 

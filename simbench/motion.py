@@ -10,10 +10,12 @@ from jaxtyping import Float64, Int64
 
 from fusion.geometry import Transform
 from simbench.kinematics import chain
-from simbench.shake import Shake
-from simbench.world import STRIDE_HZ, STRIDE_RAD, SWAY_HZ, SWAY_RAD, World
+from simbench.path import Track
+from simbench.shake import BodyShake, Shake
+from simbench.world import STRIDE_HZ, STRIDE_RAD, SWAY_HZ, SWAY_RAD, Body, World
 
 FULL_SWAY_MPS = 1.0
+PIVOT_M = (0.0, 0.0, 0.4)  # about what the ego's body shakes, in the ego frame
 Poses = tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]
 
 
@@ -46,6 +48,36 @@ def then(first: Poses, second: Poses) -> Poses:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Drive:
+    """How far and how fast an actor has gone at some times: what its wheels and limbs follow."""
+
+    t_s: Float64[np.ndarray, " n"]
+    arc_m: Float64[np.ndarray, " n"]
+    speed_mps: Float64[np.ndarray, " n"]
+
+    @classmethod
+    def of(cls, track: Track, t_ns: Int64[np.ndarray, " n"]) -> Drive:
+        """The drive along a track at true times t_ns."""
+        t_s = np.asarray(t_ns, dtype=np.float64) * 1e-9
+        return cls(t_s=t_s, arc_m=track.arc_m(t_ns), speed_mps=track.speed_at(t_ns))
+
+
+def joint_angle_rad(body: Body, drive: Drive) -> Float64[np.ndarray, " n"]:
+    """Angle of a body's joint: wheels roll, riders sway, walkers' limbs swing."""
+    angle: np.ndarray
+    phase = 2.399963 * body.actor  # walkers out of step (golden angle)
+    if body.joint == "wheel":
+        return drive.arc_m / body.wheel_radius_m
+    if body.joint == "sway":
+        riding = np.clip(drive.speed_mps / FULL_SWAY_MPS, 0.0, 1.0)  # who stands does not sway
+        angle = riding * SWAY_RAD * np.sin(2.0 * np.pi * SWAY_HZ * drive.t_s + phase)
+        return angle
+    walking = np.clip(drive.speed_mps / 1.3, 0.0, 1.5)
+    angle = body.swing_sign * walking * STRIDE_RAD * np.sin(2.0 * np.pi * STRIDE_HZ * drive.t_s + phase)
+    return angle
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Motion:
     """The scripted motion of a world and of the sensors on its ego.
 
@@ -59,8 +91,8 @@ class Motion:
     ego_actor: int
     T_ego_root: Transform
     T_ego_sensor: Mapping[str, Transform]
-    body_shake: Shake | None = None
-    pivot_m: tuple[float, float, float] = (0.0, 0.0, 0.4)
+    body_shake: BodyShake | None = None
+    pivot_m: tuple[float, float, float] = PIVOT_M
     flex: Mapping[str, Shake] = field(default_factory=dict)
 
     def ego(self, t_ns: Int64[np.ndarray, " n"]) -> Poses:
@@ -116,11 +148,12 @@ class Motion:
         position = np.empty((n, len(bodies) + 1, 3))
         rotation[:, 0], position[:, 0] = np.eye(3), 0.0
         angle = np.zeros((n, len(bodies)))
+        drives = [Drive.of(actor.track, t_ns) for actor in self.world.actors]
         for row, body in enumerate(bodies):
             if body.parent == 0:
                 rotation[:, row + 1], position[:, row + 1] = self._root(body.actor, t_ns)
-            elif (turned := self.joint_angle_rad(row, t_ns)) is not None:
-                angle[:, row] = turned
+            elif body.joint:
+                angle[:, row] = joint_angle_rad(body, drives[body.actor])
         chain(
             table.parent,
             table.rotation,
@@ -138,19 +171,7 @@ class Motion:
         body = self.world.bodies[row]
         if not body.joint:
             return None
-        track = self.world.actors[body.actor].track
-        angle: np.ndarray
-        t_s = np.asarray(t_ns, dtype=np.float64) * 1e-9
-        phase = 2.399963 * body.actor  # walkers out of step (golden angle)
-        if body.joint == "wheel":
-            return track.arc_m(t_ns) / body.wheel_radius_m
-        if body.joint == "sway":
-            riding = np.clip(track.speed_at(t_ns) / FULL_SWAY_MPS, 0.0, 1.0)  # who stands does not sway
-            angle = riding * SWAY_RAD * np.sin(2.0 * np.pi * SWAY_HZ * t_s + phase)
-            return angle
-        walking = np.clip(track.speed_at(t_ns) / 1.3, 0.0, 1.5)
-        angle = body.swing_sign * walking * STRIDE_RAD * np.sin(2.0 * np.pi * STRIDE_HZ * t_s + phase)
-        return angle
+        return joint_angle_rad(body, Drive.of(self.world.actors[body.actor].track, t_ns))
 
     def _script(self, actor: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:
         xy, heading = self.world.actors[actor].track.at(t_ns)

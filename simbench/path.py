@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -13,7 +14,10 @@ from scenarios.scenario import Path
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Track:
-    """A drive. `at` gives pose and motion at true times t_ns [n]; past either end it goes on straight."""
+    """A drive. `at` gives pose and motion at true times t_ns [n]; past either end it goes on straight.
+
+    Between the knots of a curve, place and heading are C2 in the arc length: an accelerometer sees no kinks.
+    """
 
     knot_s: Float64[np.ndarray, " k"]  # arc length table, m
     knot_xy_m: Float64[np.ndarray, "k 2"]
@@ -24,10 +28,16 @@ class Track:
     def arc_m(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
         """Distance driven since t = 0 (negative before), the exact integral of the speed profile."""
         t = np.asarray(t_ns, dtype=np.float64) * 1e-9
-        knots, speed = self.speed_t_s, self.speed_mps
-        # Constant speed outside the profile, linear inside: integrate per segment from t = 0.
-        driven: np.ndarray = _integral(t, knots, speed) - _integral(np.zeros(1), knots, speed)
+        driven: np.ndarray
+        if len(self.speed_mps) == 1:
+            driven = self.speed_mps[0] * t
+        else:  # constant speed outside the profile, linear inside: integrate per segment from t = 0
+            driven = _integral(t, self.speed_t_s, self.speed_mps) - self._before_0_m
         return driven
+
+    @cached_property
+    def _before_0_m(self) -> float:
+        return float(_integral(np.zeros(1), self.speed_t_s, self.speed_mps)[0])
 
     def speed_at(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
         """Speed along the path in m/s."""
@@ -41,10 +51,21 @@ class Track:
         """Position [n 2] in metres and heading [n] in radians in the world."""
         s = self.arc_m(t_ns)
         inside = np.clip(s, self.knot_s[0], self.knot_s[-1])
-        heading = np.interp(inside, self.knot_s, self.knot_heading_rad)
-        xy = np.stack([np.interp(inside, self.knot_s, self.knot_xy_m[:, i]) for i in range(2)], axis=1)
+        if self._curve is not None:
+            curve = self._curve(inside)
+            xy, heading = curve[:, :2], curve[:, 2]
+        else:
+            heading = np.interp(inside, self.knot_s, self.knot_heading_rad)
+            xy = np.stack([np.interp(inside, self.knot_s, self.knot_xy_m[:, i]) for i in range(2)], axis=1)
         beyond = (s - inside)[:, None]
         return xy + beyond * np.stack([np.cos(heading), np.sin(heading)], axis=1), heading
+
+    @cached_property
+    def _curve(self) -> CubicSpline | None:
+        """x, y, heading over the arc length; None where the path is one straight line."""
+        if len(self.knot_s) < 3:
+            return None
+        return CubicSpline(self.knot_s, np.column_stack([self.knot_xy_m, self.knot_heading_rad]))
 
 
 def _integral(

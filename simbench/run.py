@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 import traceback
 
-from simbench.capture import Captured, TakePicture
+from simbench.capture import Captured
 from simbench.case import ORACLE, Case, Job, JobResult, failed, scored
 from simbench.drive import drive
 from simbench.exhibit import pair_views
@@ -19,6 +19,7 @@ from simbench.plugins import load_pipeline
 from simbench.score.contract import ContractError
 from simbench.score.oracle import score_oracle
 from simbench.score.score import score
+from simbench.sensors.pictures import TakePicture
 from simbench.stage import Stage, pictures, record, stage
 
 

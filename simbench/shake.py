@@ -1,13 +1,30 @@
-"""A scripted shake: a sum of sinusoids per axis, known in closed form at every instant."""
+"""What a shake is to a moving body, and the scripted one: a sum of sinusoids per axis, in closed form."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64, Int64
 
 RMS_STEP_S = 1e-3
+
+
+@runtime_checkable
+class BodyShake(Protocol):
+    """How a body moves against its script at any time, axis by axis: scripted (`Shake`) or integrated over a
+    road (`dynamics.ride.Ride`).
+    """
+
+    def at(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n a"]:
+        """All axes at the true times t_ns [n]."""
+
+    def rms(self, duration_s: float) -> Float64[np.ndarray, " a"]:
+        """RMS per axis about its straight-line fit over [0, duration_s]."""
+
+    def rate_rms(self, duration_s: float) -> Float64[np.ndarray, " a"]:
+        """RMS per axis of the time derivative over [0, duration_s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,19 +45,24 @@ class Shake:
 
     def rms(self, duration_s: float) -> Float64[np.ndarray, " a"]:
         """RMS per axis about its straight-line fit over [0, duration_s], sampled every millisecond."""
-        value = self.at(_times_ns(duration_s))
-        t = np.linspace(-1.0, 1.0, len(value))
-        fit = np.polynomial.polynomial.polyfit(t, value, 1)
-        rms: np.ndarray = np.std(value - np.polynomial.polynomial.polyval(t, fit).T, axis=0)
-        return rms
+        return rms_about_line(self.at(times_ns(duration_s)))
 
     def rate_rms(self, duration_s: float) -> Float64[np.ndarray, " a"]:
         """RMS per axis of the time derivative over [0, duration_s]."""
-        rms: np.ndarray = np.std(np.diff(self.at(_times_ns(duration_s)), axis=0) / RMS_STEP_S, axis=0)
+        rms: np.ndarray = np.std(np.diff(self.at(times_ns(duration_s)), axis=0) / RMS_STEP_S, axis=0)
         return rms
 
 
-def _times_ns(duration_s: float) -> Int64[np.ndarray, " n"]:
+def rms_about_line(value: Float64[np.ndarray, "n a"]) -> Float64[np.ndarray, " a"]:
+    """RMS of each column about its straight-line fit."""
+    t = np.linspace(-1.0, 1.0, len(value))
+    fit = np.polynomial.polynomial.polyfit(t, value, 1)
+    rms: np.ndarray = np.std(value - np.polynomial.polynomial.polyval(t, fit).T, axis=0)
+    return rms
+
+
+def times_ns(duration_s: float) -> Int64[np.ndarray, " n"]:
+    """Every millisecond of a run."""
     return np.arange(0, int(duration_s * 1e9), int(RMS_STEP_S * 1e9), dtype=np.int64)
 
 

@@ -13,9 +13,11 @@ from scenarios.errors import Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments
 from scenarios.load import Family, load_scenario
 from scenarios.scenario import Scenario, System
-from simbench.capture import Captured, TakePicture, capture
+from simbench.capture import Captured, capture
 from simbench.case import Job
 from simbench.plugins import reads_images
+from simbench.sensors.pictures import TakePicture, by_gl, by_rays
+from simbench.sensors.render import Renderer
 from simbench.sensors.rig import SensorRig, assemble, resized
 from simbench.world import World, build_world
 
@@ -42,7 +44,7 @@ def stage(job: Job) -> Stage:
     faults = faults_of(job, family, scenario)
     staged = set_stage(family, scenario, job.system, faults, job.seed, job.size_px)
     where = Where(file=None) if job.faults else family.where.at("faults")
-    faults.check_cameras(tuple(staged.rig.cameras), where)
+    faults.check(tuple(staged.rig.cameras), where)
     return staged
 
 
@@ -82,12 +84,13 @@ def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captu
 
 @contextmanager
 def pictures(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
-    """Takes pictures for a job whose pipelines read them, else None. Raises `gl.RenderingUnavailable`."""
+    """Takes pictures for a job whose pipelines read them, else None. Raises `gl.RenderingUnavailable` for
+    images by OpenGL where nothing can draw."""
     if job.images == "none" or not any(reads_images(name) for name in job.pipelines):
         yield None
         return
-    from simbench.sensors.render import Renderer
-
-    pinholes = staged.rig.pinholes
+    if job.images == "raycast":
+        yield by_rays(staged.rig, job.seed)
+        return
     with Renderer(staged.world) as renderer:
-        yield lambda motion, camera, t_ns, pose: renderer.rgb(motion, t_ns, pose, pinholes[camera])
+        yield by_gl(staged.rig, renderer)

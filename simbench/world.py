@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -17,12 +16,18 @@ from scenarios.errors import BadInput
 from scenarios.scenario import Path, Scenario, System
 from scenarios.seeding import stream
 from simbench import scatter
+from simbench.looks import Looks, Paint, road_paint
 from simbench.path import Track, make_track
 from simbench.sensors import rays
+from simbench.sensors.reflectance import roughness_gain
 from simbench.truth import ObjectInfo
 
 PARTS = FilePath(__file__).parent.parent / "scenarios" / "parts"
 GROUND = -1  # object id of the ground
+SHAPES = {
+    rays.PLANE: "plane", rays.SPHERE: "sphere", rays.CAPSULE: "capsule", rays.ELLIPSOID: "ellipsoid",
+    rays.CYLINDER: "cylinder", rays.BOX: "box",
+}  # fmt: skip
 AFTER_S = 0.5  # cameras and receivers go on for so long after the last sweep
 EXTENT_M = 40.0  # what the shadow map covers around the sun's point
 SUN_DIRECTION = (0.45, -0.5, -0.75)
@@ -93,6 +98,8 @@ class World:
     geom_model_id: Int32[np.ndarray, " g"]
     geom_object: Int32[np.ndarray, " g"]
     reflectivity: Float64[np.ndarray, " g"]
+    roughness_gain: Float64[np.ndarray, " g"]  # see sensors/reflectance.py
+    looks: Looks
     objects: tuple[ObjectInfo, ...]
     scale: tuple[float, ...]  # of each object against its part
     box_centre_m: Float64[np.ndarray, "o 3"]  # in the object's root frame
@@ -146,10 +153,17 @@ class PartInfo:
 
 @lru_cache(maxsize=64)
 def part_info(part: str) -> PartInfo:
-    """Measure a part of scenarios/parts by compiling it alone."""
+    """Measure a part of scenarios/parts by compiling it alone. BadInput: a geom that rays cannot meet."""
     import mujoco
 
-    model = mujoco.MjSpec.from_file(str(PARTS / f"{part}.xml")).compile()
+    spec = mujoco.MjSpec.from_file(str(PARTS / f"{part}.xml"))
+    for geom in spec.geoms:
+        if int(geom.type) not in SHAPES:
+            kind = mujoco.mjtGeom(geom.type).name.removeprefix("mjGEOM_").lower()
+            raise BadInput(
+                f"part '{part}': geom '{geom.name}' is a {kind}; rays can meet a {', '.join(SHAPES.values())}"
+            )
+    model = spec.compile()
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     half = half_extent(model.geom_type, model.geom_size, data.geom_xmat.reshape(-1, 3, 3))
@@ -215,7 +229,8 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
         name: _draw_material(stream(seed, "material", "scene", name), entry)
         for name, entry in sorted(materials().items())
     }
-    _dress(spec, scenario, scene)
+    paint = road_paint(scenario.road, *(_colour(scene, name) for name in ("asphalt", "marking", "grass")))
+    _dress(spec, scene, paint)
     reflectivity: dict[str, float] = {"asphalt": scene["asphalt"][1]}
 
     tracks = {name: make_track(actor.path) for name, actor in system.actors.items()}
@@ -274,10 +289,16 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
         np.array(positions),
         moving,
         reflectivity,
+        paint,
     )
 
 
-def _dress(spec: Any, scenario: Scenario, scene: dict[str, tuple[list[float], float]]) -> None:
+def _colour(scene: dict[str, tuple[list[float], float]], material: str) -> tuple[float, float, float]:
+    red, green, blue = scene[material][0]
+    return red, green, blue
+
+
+def _dress(spec: Any, scene: dict[str, tuple[list[float], float]], paint: Paint) -> None:
     """Sky, sun, ground and rendering quality."""
     import mujoco
 
@@ -307,7 +328,7 @@ def _dress(spec: Any, scenario: Scenario, scene: dict[str, tuple[list[float], fl
         name="ground", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1], material="asphalt",
         contype=0, conaffinity=0, group=1,
     )  # fmt: skip
-    _paint(spec, scenario, scene)
+    _lay(spec, scene, paint)
     spec.worldbody.add_light(
         name="sun", type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL, pos=[0, 0, 60], dir=SUN_DIRECTION,
         diffuse=[0.76, 0.73, 0.66], specular=[0.35, 0.35, 0.33], castshadow=True,
@@ -315,35 +336,25 @@ def _dress(spec: Any, scenario: Scenario, scene: dict[str, tuple[list[float], fl
     spec.worldbody.add_camera(name="eye")
 
 
-def _paint(spec: Any, scenario: Scenario, scene: dict[str, tuple[list[float], float]]) -> None:
-    """Lines beside the lanes and grass beyond the pavement: boxes a few millimetres thick that cameras see
-    and the ray kernel leaves out (geom group 2)."""
+def _lay(spec: Any, scene: dict[str, tuple[list[float], float]], paint: Paint) -> None:
+    """The paint as boxes a millimetre thick, which OpenGL draws and the ray kernel leaves out (geom group
+    2)."""
     import mujoco
-
-    def slab(name: str, material: str, y0: float, y1: float, x0: float, x1: float, top: float) -> None:
-        spec.worldbody.add_geom(
-            name=name, type=mujoco.mjtGeom.mjGEOM_BOX, material=material, contype=0, conaffinity=0, group=2,
-            size=[(x1 - x0) / 2, (y1 - y0) / 2, top / 2], pos=[(x0 + x1) / 2, (y0 + y1) / 2, top / 2],
-        )  # fmt: skip
 
     for material in ("marking", "grass"):
         spec.add_material(name=material, rgba=[*scene[material][0], 1.0], specular=0.02)
-    half_length, half_width = scenario.road.length_m / 2, scenario.road.width_m / 2
-    slab("grass-left", "grass", half_width, half_width + 200.0, -half_length, half_length, 0.001)
-    slab("grass-right", "grass", -half_width - 200.0, -half_width, -half_length, half_length, 0.001)
-    lanes = sorted(scenario.road.lanes_m)
-    edges = sorted({lanes[0][0], lanes[-1][1]}) if lanes else []
-    for number, y in enumerate(edges):
-        slab(f"marking-{number}", "marking", y - 0.06, y + 0.06, -half_length, half_length, 0.001)
-    for first, second in pairwise(lanes):
-        y = 0.5 * (first[1] + second[0])
-        for x in np.arange(-half_length, half_length - 3.0, 9.0):
-            slab(f"dash-{y:.1f}-{x:.0f}", "marking", y - 0.06, y + 0.06, float(x), float(x) + 3.0, 0.001)
+    for number, (x0, y0, x1, y1) in paint.rectangles():
+        spec.worldbody.add_geom(
+            name=f"paint-{number}-{x0:.0f}", material="grass" if paint.grass[number] else "marking",
+            type=mujoco.mjtGeom.mjGEOM_BOX, contype=0, conaffinity=0, group=2,
+            size=[(x1 - x0) / 2, (y1 - y0) / 2, 0.0005], pos=[(x0 + x1) / 2, (y0 + y1) / 2, 0.0005],
+        )  # fmt: skip
 
 
 def _tabulate(
     model: Any, objects: tuple[ObjectInfo, ...], scale: tuple[float, ...], centres: np.ndarray,
-    rotations: np.ndarray, positions: np.ndarray, moving: list[tuple[str, int, Track]], reflectivity: dict[str, float],
+    rotations: np.ndarray, positions: np.ndarray, moving: list[tuple[str, int, Track]],
+    reflectivity: dict[str, float], paint: Paint,
 ) -> World:  # fmt: skip
     import mujoco
 
@@ -399,14 +410,16 @@ def _tabulate(
     keep = np.flatnonzero(model.geom_group != 2)
     geom_object = np.full(len(keep), GROUND, dtype=np.int32)
     body_index = np.zeros(len(keep), dtype=np.int32)
-    value = np.empty(len(keep))
+    value, slope_deg = np.empty(len(keep)), np.empty(len(keep))
     rotation_table = np.empty((len(keep), 3, 3))
     position_table = np.empty((len(keep), 3))
     for row, geom_id in enumerate(keep):
         body_id = int(model.geom_bodyid[geom_id])
         prefix = model.body(body_id).name.split("/")[0]
         geom_object[row] = by_name.get(prefix, GROUND)
-        value[row] = reflectivity[model.material(int(model.geom_matid[geom_id])).name]
+        name = model.material(int(model.geom_matid[geom_id])).name
+        value[row] = reflectivity[name]
+        slope_deg[row] = materials()[name.split("/")[-1]].get("roughness_deg", 0.0)
         body_index[row] = index_of.get(body_id, 0)
         if body_index[row]:
             matrix = np.empty(9)
@@ -417,7 +430,9 @@ def _tabulate(
                 data.geom_xmat[geom_id].reshape(3, 3),
                 data.geom_xpos[geom_id],
             )
-    kind = model.geom_type[keep]
+    kind, material = model.geom_type[keep], model.geom_matid[keep]
+    colour = model.mat_rgba[material, :3].astype(np.float64)
+    colour[kind == rays.PLANE] = paint.ground_colour
     return World(
         model=model,
         geoms=rays.Geoms(
@@ -431,6 +446,13 @@ def _tabulate(
         geom_model_id=keep.astype(np.int32),
         geom_object=geom_object,
         reflectivity=value,
+        roughness_gain=roughness_gain(np.deg2rad(slope_deg)),
+        looks=Looks(
+            colour=colour,
+            specular=model.mat_specular[material].astype(np.float64),
+            shininess=model.mat_shininess[material].astype(np.float64),
+            paint=paint,
+        ),
         objects=objects,
         scale=scale,
         box_centre_m=centres,

@@ -10,13 +10,17 @@ from jaxtyping import Float64, Int64
 
 from fusion.messages import Calibration
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, Flex, TriggerOffset, Vibration
+from scenarios.faults import CalibrationRotation, EdgeError, Flex, RoadShake, TriggerOffset, Vibration
+from scenarios.scenario import System
 from scenarios.severity import Profile
+from simbench.dynamics.ride import Ride
 from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
+from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
-from simbench.sensors.rig import CameraTiming, SensorRig
+from simbench.sensors.clock import CameraTiming
+from simbench.sensors.rig import SensorRig
 from simbench.shake import Shake
 from simbench.world import World
 
@@ -26,7 +30,7 @@ class Drawn:
     """What this seed drew for each fault: the *realised* side of the receipts."""
 
     profile: Profile
-    body_shake: Shake | None
+    body_shake: Shake | Ride | None
     flex: Mapping[str, Shake]
     delays_ns: Mapping[str, Int64[np.ndarray, " f"]]
     edge_errors: Mapping[str, Mapping[int, Float64[np.ndarray, "f 4"]]]
@@ -43,11 +47,12 @@ def draw(
     world: World,
     faults: FaultSet,
     timing: Mapping[str, CameraTiming],
-    duration_s: float,
+    system: System,
     seed: int,
 ) -> Drawn:
     """Draw every fault from its own stream; none moves another's numbers."""
-    vibration, rotation = faults.get(Vibration), faults.get(CalibrationRotation)
+    duration_s = system.duration_s
+    vibration, rotation, road = faults.get(Vibration), faults.get(CalibrationRotation), faults.get(RoadShake)
     offset, bend, edge_error = faults.get(TriggerOffset), faults.get(Flex), faults.get(EdgeError)
     profile: Profile = "car" if rig.rig.body == "vehicle" else "rider"
     if vibration is not None and vibration.profile != "auto":
@@ -66,9 +71,17 @@ def draw(
         for name, camera in rig.cameras.items():
             frames, period_s = len(timing[name].mid_ns), 1.0 / camera.rate_hz
             edges[name] = detector_fault.edge_errors(edge_error, name, world.objects, frames, period_s, seed)
+    body_shake: Shake | Ride | None = None
+    if vibration is not None:
+        body_shake = motion_fault.body_shake(vibration, profile, duration_s, seed)
+    elif road is not None and not road.is_off:
+        track = next(actor.track for actor in world.actors if actor.name == system.ego)
+        exposures = [timing[name].mid_ns + delays.get(name, 0) for name in timing]
+        origin = rig.rig.ego_origin_m
+        body_shake = road_fault.ride(road, profile, track, origin, exposures, duration_s, seed)
     return Drawn(
         profile=profile,
-        body_shake=motion_fault.body_shake(vibration, profile, duration_s, seed) if vibration else None,
+        body_shake=body_shake,
         flex=flex,
         delays_ns=delays,
         edge_errors=edges,
@@ -80,4 +93,6 @@ def shake_words(drawn: Drawn, duration_s: float) -> str:
     """What the body's shake is, in words; empty when it does not shake."""
     if drawn.body_shake is None:
         return ""
+    if isinstance(drawn.body_shake, Ride):
+        return road_fault.describe_ride(drawn.body_shake, drawn.profile, duration_s)
     return motion_fault.describe_shake(drawn.body_shake, drawn.profile, duration_s)

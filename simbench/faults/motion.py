@@ -25,11 +25,17 @@ from simbench.faults.estimate import (
     lever_shift_m,
 )
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.shake import Shake, draw_shake
+from simbench.shake import BodyShake, Shake, draw_shake
 
 VIBRATION, FLEX = "motion.vibration_deg", "motion.flex_deg"
 NOTE = "camera attitude by PnP less the body's by gyro"
 TO_DEG_AND_M = np.array([np.rad2deg(1.0)] * 3 + [1.0])
+AXES = (  # of a body shake: name, unit, what measures it
+    ("roll", "deg", "integrated gyro"),
+    ("pitch", "deg", "integrated gyro"),
+    ("yaw", "deg", "integrated gyro"),
+    ("heave", "m", "camera heights by PnP"),
+)
 LINES = 64  # sinusoids per axis
 # Modes per axis (roll, pitch, yaw, heave): (frequency Hz, damping ratio, share of the power). Car: sprung-
 # mass modes and wheel hop, so that rate RMS / angle RMS is about 8 1/s as computed for road classes A-E;
@@ -53,14 +59,18 @@ BAND_NOISE_SHARE = 0.03
 
 
 def describe_shake(shake: Shake, profile: Profile, duration_s: float) -> str:
-    """One sentence on what a body shake is in the world: size, rate, band and the road that gives it."""
-    rms, rate = np.rad2deg(shake.rms(duration_s)), np.rad2deg(shake.rate_rms(duration_s))
-    low, high = BAND_HZ[profile]
-    road = road_class(float(rms[1]), profile)
+    """One sentence on what a scripted shake is in the world: size, rate, band and the road that gives it."""
+    road = road_class(float(np.rad2deg(shake.rms(duration_s)[1])), profile)
     source = road if road.startswith("beyond") else f"ISO 8608 road class {road} on this vehicle"
+    return shake_sizes(shake, BAND_HZ[profile], duration_s) + f": {source}"
+
+
+def shake_sizes(shake: BodyShake, band_hz: tuple[float, float], duration_s: float) -> str:
+    """Sizes, rate and band of a body shake in words."""
+    rms, rate = np.rad2deg(shake.rms(duration_s)), np.rad2deg(shake.rate_rms(duration_s))
     return (
         f"pitch {rms[1]:.2f} deg RMS ({rate[1]:.1f} deg/s), roll {rms[0]:.2f}, yaw {rms[2]:.2f} deg, heave "
-        f"{shake.rms(duration_s)[3] * 1e3:.0f} mm, {low:g}-{high:g} Hz: {source}"
+        f"{shake.rms(duration_s)[3] * 1e3:.0f} mm, {band_hz[0]:g}-{band_hz[1]:g} Hz"
     )
 
 
@@ -115,12 +125,47 @@ def vibration_receipts(
     body: BodyAttitude | None,
     evidence: Sequence[CameraEvidence],
 ) -> tuple[Receipt, ...]:
-    """Roll, pitch and yaw by the integrated gyro; heave, which no gyro sees, by the cameras' height (PnP)
-    less what their lever arm explains. Each is how often the drawn shake is contained in what was measured,
-    times its RMS: signed, and near 0 when something else shook.
-    """
+    """What was asked for, drawn and found of roll, pitch, yaw and heave, wherever one was asked for."""
     asked = requested_rms(spec) * TO_DEG_AND_M
-    drawn = np.zeros(4) if realised is None else realised.rms(duration_s) * TO_DEG_AND_M
+    drawn = drawn_rms(realised, duration_s)
+    found = found_rms(realised, duration_s, body, evidence)
+    return tuple(
+        judge(
+            fault=VIBRATION,
+            quantity=f"{name} RMS",
+            unit=unit,
+            requested=float(asked[axis]),
+            realised=float(drawn[axis]),
+            measured=found[axis][0],
+            estimator_sd=float(found[axis][1]),
+            allowed=0.01 * float(asked[axis]),
+            note=note,
+        )
+        for axis, (name, unit, note) in enumerate(AXES)
+        if asked[axis] > 0.0
+    )
+
+
+def drawn_rms(realised: BodyShake | None, duration_s: float) -> Float64[np.ndarray, "4"]:
+    """RMS of roll, pitch, yaw in degrees and heave in metres; 0 where nothing was drawn."""
+    rms: np.ndarray = np.zeros(4) if realised is None else realised.rms(duration_s) * TO_DEG_AND_M
+    return rms
+
+
+def found_rms(
+    realised: BodyShake | None,
+    duration_s: float,
+    body: BodyAttitude | None,
+    evidence: Sequence[CameraEvidence],
+) -> list[tuple[float | None, float]]:
+    """(found, SD of the estimate) of roll, pitch, yaw in degrees and heave in metres; found is None without
+    the sensors for it.
+
+    Roll, pitch and yaw by the integrated gyro; heave, which no gyro sees, by the cameras' height (PnP) less
+    what their lever arm explains. Each is how often the drawn shake is contained in what was measured, times
+    its RMS: signed, and near 0 when something else shook.
+    """
+    drawn = drawn_rms(realised, duration_s)
     found: list[tuple[float | None, float]] = [(None, 0.0)] * 4
     if body is not None:
         inside = body.stamp_ns < duration_s * 1e9
@@ -137,24 +182,10 @@ def vibration_receipts(
         height = np.concatenate([detrended(e.shift_m[:, 2:] - lever_shift_m(e)[:, 2:]) for e in evidence])
         signal = np.concatenate([detrended(_at(realised, e.taken_ns)[:, 3:]) for e in evidence])
         found[3] = _contained(height, signal, drawn[3], 1.0), _heave_sd_m(evidence, body)
-    return tuple(
-        judge(
-            fault=VIBRATION,
-            quantity=f"{name} RMS",
-            unit="m" if name == "heave" else "deg",
-            requested=float(asked[axis]),
-            realised=float(drawn[axis]),
-            measured=found[axis][0],
-            estimator_sd=float(found[axis][1]),
-            allowed=0.01 * float(asked[axis]),
-            note="camera heights by PnP" if name == "heave" else "integrated gyro",
-        )
-        for axis, name in enumerate(("roll", "pitch", "yaw", "heave"))
-        if asked[axis] > 0.0
-    )
+    return found
 
 
-def _at(shake: Shake | None, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 4"]:
+def _at(shake: BodyShake | None, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 4"]:
     return np.zeros((len(t_ns), 4)) if shake is None else shake.at(t_ns)
 
 

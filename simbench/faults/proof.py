@@ -8,17 +8,20 @@ from fusion.camera import project_points
 from fusion.geometry import rotation_log
 from fusion.messages import Detections, EgoMotion
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, Flex, TriggerOffset, Vibration
+from scenarios.faults import CalibrationRotation, EdgeError, Flex, RoadShake, TriggerOffset, Vibration
 from simbench.capture import Captured
+from simbench.dynamics.ride import Ride
 from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
+from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
 from simbench.faults.draw import struck
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.receipt import Receipt
 from simbench.sensors import fiducials
 from simbench.sensors.rig import SensorRig
+from simbench.shake import Shake
 
 
 def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: float) -> tuple[Receipt, ...]:
@@ -31,7 +34,11 @@ def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: f
     if (offset := faults.get(TriggerOffset)) is not None:
         result += timing_fault.receipts(offset, struck(offset, rig), drawn.delays_ns, evidence, body)
     if (vibration := faults.get(Vibration)) is not None:
-        result += motion_fault.vibration_receipts(vibration, drawn.body_shake, duration_s, body, evidence)
+        scripted = drawn.body_shake if isinstance(drawn.body_shake, Shake) else None
+        result += motion_fault.vibration_receipts(vibration, scripted, duration_s, body, evidence)
+    if (road := faults.get(RoadShake)) is not None:
+        driven = drawn.body_shake if isinstance(drawn.body_shake, Ride) else None
+        result += road_fault.road_receipts(road, driven, duration_s, body, evidence)
     if (bend := faults.get(Flex)) is not None:
         result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
     if (rotation := faults.get(CalibrationRotation)) is not None:

@@ -77,12 +77,13 @@ def common_field(marks: list[Marks], camera: PinholeCamera, aspect: float = WIDT
     y1 = max([b[3] for b in boxes] + [p[1] for p in dots])
     width, height = (1.0 + 2.0 * MARGIN) * (x1 - x0), (1.0 + 2.0 * MARGIN) * (y1 - y0)
     width, height = max(width, height * aspect), max(height, width / aspect)
-    x = _within(0.5 * (x0 + x1), 0.5 * width, float(camera.width_px))
-    y = _within(0.5 * (y0 + y1), 0.5 * height, float(camera.height_px))
+    x = within(0.5 * (x0 + x1), 0.5 * width, float(camera.width_px))
+    y = within(0.5 * (y0 + y1), 0.5 * height, float(camera.height_px))
     return (x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
 
 
-def _within(middle: float, half: float, side: float) -> float:
+def within(middle: float, half: float, side: float) -> float:
+    """The middle of an interval, moved so that it lies in [0, side]; centred where it is longer."""
     return 0.5 * side if 2.0 * half >= side else min(max(middle, half), side - half)
 
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
 from scenarios.errors import BadInput
-from simbench.case import Job, JobResult
+from simbench.case import Images, Job, JobResult
 from simbench.exhibit import PairView
 from simbench.files import write_text
 from simbench.report import figures, palette, tables
@@ -47,7 +47,7 @@ NOT_SHOWN = (
     "Boxes come from a simulated detector (edge errors, misses in bursts, false boxes), not from a network.",
     "Bodies are rigid primitives with one reflectivity a material; glass is opaque; no loose clothes.",
     "No rain, fog, dust, sun glare, multi-path or cross-talk between LiDARs; the ground is flat.",
-    "Shake is scripted noise of the stated level, not the response of a vehicle to a measured road.",
+    "Vibration is scripted noise of the stated level; motion.road integrates a vehicle, on a drawn road.",
     "Cameras are pinholes with a global shutter; exposure blur and lens residuals are not drawn.",
     "The paper published no data: its values stand beside ours for orientation. That its scenario 1 is the "
     "approach and its scenario 2 the receding half is assumed.",
@@ -116,7 +116,7 @@ def write_report(
     out: Path,
     *,
     command: str,
-    images: str,
+    images: Images,
     environment: Mapping[str, object],
 ) -> Path:
     """Write `out/report.html` and return its path. `images`: 'none' draws no pictures. Videos that lie in
@@ -170,7 +170,7 @@ def _template() -> Any:
     return made.get_template("page.html.j2")
 
 
-def _not_shown(groups: Sequence[Group], images: str) -> tuple[str, ...]:
+def _not_shown(groups: Sequence[Group], images: Images) -> tuple[str, ...]:
     few = min(len(group.runs) for group in groups) < MIN_RUNS
     first = (
         (f"{runs_words(groups)}. No intervals, no p-values: other seeds may look different.",) if few else ()
@@ -194,7 +194,7 @@ def _flat(environment: Mapping[str, object], above: str = "") -> list[tuple[str,
 # -- one group ------------------------------------------------------------------------------------------
 
 
-def _section(group: Group, number: int, *, images: str, out: Path) -> Section:
+def _section(group: Group, number: int, *, images: Images, out: Path) -> Section:
     chosen = median_and_worst(group)
     sample = group.results(group.main_side)[0][1]
     median = worst = modes = shapes = over_frames = None
@@ -250,7 +250,7 @@ def _panel(group: Group, shown: JobResult, pipeline: str, like: Sequence[str]) -
 class _Replays:
     """Replays by job and the pictures of all chosen instants: one world and one renderer per job."""
 
-    def __init__(self, group: Group, chosen: Sequence[Instant], images: str) -> None:
+    def __init__(self, group: Group, chosen: Sequence[Instant], images: Images) -> None:
         wanted: dict[Job, list[tuple[str, int]]] = {}
         for instant in chosen:
             for side in group.sides:
@@ -260,7 +260,7 @@ class _Replays:
                     wanted.setdefault(result.job, []).append((view.camera, view.capture_ns))
         self._made = {job: Replay(job) for job in wanted}
         self._taken = (
-            {job: take_pictures(self._made[job], keys, SHARPER) for job, keys in wanted.items()}
+            {job: take_pictures(self._made[job], keys, images, SHARPER) for job, keys in wanted.items()}
             if images != "none"
             else {}
         )

@@ -21,16 +21,19 @@ from fusion.shape import BenchmarkShapes, ShapeConfig
 from fusion.timing import StepClock
 from scenarios.seeding import stream
 from simbench.capture import set_in_motion
-from simbench.case import Job
+from simbench.case import Images, Job
 from simbench.exhibit import PairView
 from simbench.faults.draw import Drawn, draw
 from simbench.motion import Motion, at
 from simbench.plugins import load_pipeline
 from simbench.sensors import lidar
+from simbench.sensors.camera import take
 from simbench.sensors.render import Renderer
+from simbench.sensors.rows import line_delay_ns
 from simbench.stage import CATEGORIES, Stage, stage
 
-LARGEST_PX = 2048  # of the renderer's buffer
+LARGEST_PX = 2048  # along a picture's longer side: OpenGL's buffer
+FOR_THE_READER = {"monochrome": False, "motion_blur_samples": 1, "noise": None, "jpeg_quality": None}
 
 
 class Replay:
@@ -41,9 +44,7 @@ class Replay:
         rig, system = self.staged.rig, self.staged.system
         timing = {name: rig.timing(name, system.duration_s, job.seed) for name in rig.cameras}
         self.seed = job.seed
-        self.drawn: Drawn = draw(
-            rig, self.staged.world, self.staged.faults, timing, system.duration_s, job.seed
-        )
+        self.drawn: Drawn = draw(rig, self.staged.world, self.staged.faults, timing, system, job.seed)
         self.motion: Motion = set_in_motion(self.staged.world, rig, system.ego, self.drawn)
 
     def scan(self, seq: int) -> LidarScan:
@@ -54,25 +55,34 @@ class Replay:
         return lidar.sweep(rig.lidar_name, rig.lidar, self.motion, start_ns, seq, rng)[0]
 
     @contextmanager
-    def camera(self, sharper: int = 1) -> Iterator[Taker]:
-        """Takes pictures while open. `sharper`: how many pixels of the picture lie along one of the camera's,
-        less where the renderer's buffer would not hold them. Raises gl.RenderingUnavailable."""
+    def camera(self, images: Images, sharper: int = 1) -> Iterator[Taker]:
+        """Takes pictures while open, by rays or OpenGL. `sharper`: how many pixels of the picture lie along
+        one of the camera's, less where it would be larger than LARGEST_PX. Raises gl.RenderingUnavailable."""
+        if images != "gl":
+            yield Taker(self, None, sharper)
+            return
         with Renderer(self.staged.world) as renderer:
             yield Taker(self, renderer, sharper)
 
 
 class Taker:
-    """Pictures of a replay."""
+    """Pictures of a replay for the reader: from where and when the camera took them, but in colour, without
+    noise, blur or JPEG. `renderer`: OpenGL's; None: by rays."""
 
-    def __init__(self, replay: Replay, renderer: Renderer, sharper: int) -> None:
+    def __init__(self, replay: Replay, renderer: Renderer | None, sharper: int) -> None:
         self._replay, self._renderer, self._sharper = replay, renderer, sharper
 
     def take(self, camera: str, capture_ns: int) -> UInt8[np.ndarray, "h w 3"]:
         """What the camera sees at a true time."""
         replay = self._replay
-        pinhole = replay.staged.rig.pinholes[camera]
+        sensor, pinhole = replay.staged.rig.cameras[camera], replay.staged.rig.pinholes[camera]
+        large = magnified(pinhole, self._sharper)
+        if self._renderer is None:
+            delay_ns = line_delay_ns(sensor) * pinhole.height_px / large.height_px
+            plain = sensor.model_copy(update=FOR_THE_READER)
+            return take(replay.motion, camera, plain, large, capture_ns, delay_ns, None).rgb
         pose = at(replay.motion.sensor(camera, np.array([capture_ns], dtype=np.int64)))
-        return self._renderer.rgb(replay.motion, capture_ns, pose, magnified(pinhole, self._sharper))
+        return self._renderer.rgb(replay.motion, capture_ns, pose, large)
 
 
 def magnified(camera: PinholeCamera, sharper: int) -> PinholeCamera:
@@ -90,10 +100,10 @@ def magnified(camera: PinholeCamera, sharper: int) -> PinholeCamera:
 
 
 def take_pictures(
-    replay: Replay, wanted: Sequence[tuple[str, int]], sharper: int = 1
+    replay: Replay, wanted: Sequence[tuple[str, int]], images: Images, sharper: int = 1
 ) -> dict[tuple[str, int], UInt8[np.ndarray, "h w 3"]]:
     """Pictures for a list of (camera, capture_ns)."""
-    with replay.camera(sharper) as taker:
+    with replay.camera(images, sharper) as taker:
         return {key: taker.take(*key) for key in dict.fromkeys(wanted)}
 
 

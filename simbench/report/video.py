@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -14,16 +14,28 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
+from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
-from simbench.case import JobResult
+from simbench.case import Images, JobResult
 from simbench.exhibit import PairView
 from simbench.report import palette
 from simbench.report.choose import Group, groups_of, pairs_of, shift_px
-from simbench.report.overlay import WIDTH, Marks, common_field, cut, dot_size, jpeg_uri, marks_of, thinned
+from simbench.report.overlay import (
+    WIDTH,
+    Marks,
+    common_field,
+    cut,
+    dot_size,
+    jpeg_uri,
+    marks_of,
+    thinned,
+    within,
+)
 from simbench.report.pictures import Replay
 from simbench.report.words import NONE, fault_words, percent, pipeline_words
 
 SLOWED = 4
+SHARPER = 2  # pixels of a picture along one of the camera's: edges are averaged, close-ups stay sharp
 PANEL_PX = (560, 420)
 GAP_PX, HEAD_PX = 8, 64  # the words stand above, where no player lays its controls
 NEIGHBOURS = 4  # the zoom is that of the widest field among so many scans before and after
@@ -41,7 +53,7 @@ def find_video(out: Path, scenario: str, system: str, seed: int) -> Path | None:
     return path if path.is_file() else None
 
 
-def write_video(result: JobResult, out: Path) -> Path:
+def write_video(result: JobResult, out: Path, images: Images = "raycast") -> Path:
     """Write the video of a result into `out`, return its path. ValueError without a target in view; raises
     gl.RenderingUnavailable where nothing draws."""
     if not result.views:
@@ -49,7 +61,7 @@ def write_video(result: JobResult, out: Path) -> Path:
     path = out / video_name(result.scenario.name, result.job.system, result.job.seed)
     replay = Replay(result.job)
     rate_hz = Fraction(replay.staged.rig.lidar.rate_hz).limit_denominator(1000) / SLOWED
-    encode(frames(result, replay), path, rate_hz)
+    encode(frames(result, replay, images), path, rate_hz)
     return path
 
 
@@ -97,7 +109,7 @@ def _area(view: PairView) -> float:
     return (x1 - x0) * (y1 - y0)
 
 
-def frames(result: JobResult, replay: Replay) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+def frames(result: JobResult, replay: Replay, images: Images) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The pictures of the video, one after another."""
     (group,) = groups_of([result])
     names = [name for name in (group.baseline, group.method) if name is not None]
@@ -108,11 +120,12 @@ def frames(result: JobResult, replay: Replay) -> Iterator[UInt8[np.ndarray, "h w
         [
             (v.camera, common_field(list(m.values()), pinholes[v.camera], PANEL_PX[0] / PANEL_PX[1]))
             for v, m in zip(views, marks, strict=True)
-        ]
+        ],
+        pinholes,
     )
     tpr = {name: {key: p.tpr for key, p in pairs_of(result, name).items()} for name in names}
     faults = fault_words(result.faults) if len(result.faults) else "no injected errors"
-    with replay.camera() as taker:
+    with replay.camera(images, SHARPER) as taker:
         for view, drawn, field in zip(views, marks, fields, strict=True):
             picture = taker.take(view.camera, view.capture_ns)
             ground = cut(picture, field, pinholes[view.camera].width_px, PANEL_PX[0])
@@ -126,13 +139,16 @@ def frames(result: JobResult, replay: Replay) -> Iterator[UInt8[np.ndarray, "h w
             yield _page(panels, _words(group, view, faults))
 
 
-def _steady(fields: Sequence[tuple[str, BoxPx]]) -> list[BoxPx]:
-    """Fields about their own centres, as wide as the widest of the same camera nearby: a calm zoom."""
+def _steady(fields: Sequence[tuple[str, BoxPx]], pinholes: Mapping[str, PinholeCamera]) -> list[BoxPx]:
+    """Fields about their own centres, as wide as the widest of the same camera nearby: a calm zoom. Like the
+    fields themselves they are moved into the image."""
     steady = []
     for i, (camera, (x0, y0, x1, y1)) in enumerate(fields):
         near = fields[max(0, i - NEIGHBOURS) : i + NEIGHBOURS + 1]
         grow = max((b[2] - b[0]) / (x1 - x0) for name, b in near if name == camera)
-        x, y, w, h = 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * grow * (x1 - x0), 0.5 * grow * (y1 - y0)
+        w, h = 0.5 * grow * (x1 - x0), 0.5 * grow * (y1 - y0)
+        x = within(0.5 * (x0 + x1), w, float(pinholes[camera].width_px))
+        y = within(0.5 * (y0 + y1), h, float(pinholes[camera].height_px))
         steady.append((x - w, y - h, x + w, y + h))
     return steady
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from scenarios.fault_set import FaultSet
+from scenarios.faults import RoadShake
 from simbench.case import ORACLE
 from simbench.report.choose import Group, mean_of_runs
 from simbench.score.statistics import MIN_RUNS
@@ -50,6 +51,10 @@ def signed_m(value: float) -> str:
     return f"{_unsigned_zero(value, 2):+.2f} m".replace("-", "−")
 
 
+def signed_ms(value: float) -> str:
+    return f"{_unsigned_zero(value, 2):+.2f} ms".replace("-", "−")
+
+
 def _unsigned_zero(value: float, digits: int) -> float:
     return 0.0 if round(value, digits) == 0.0 else value
 
@@ -62,11 +67,19 @@ def fault_words(faults: FaultSet) -> str:
     """Each fault with the number that sets it: '50 ms trigger offset and 1.1 deg vibration'."""
     said = []
     for spec in sorted(faults, key=lambda s: s.name, reverse=True):
+        if isinstance(spec, RoadShake):
+            said.append(_road_words(spec))
+            continue
         kind = spec.name.rpartition(".")[2].removesuffix("_" + spec.unit.split()[0])
         for ending in ("_ms", "_deg", "_m", "_px"):
             kind = kind.removesuffix(ending)
         said.append(f"{getattr(spec, spec.strength):g} {spec.unit.split()[0]} {kind.replace('_', ' ')}")
     return joined(said)
+
+
+def _road_words(spec: RoadShake) -> str:
+    road = "a smooth road" if spec.roughness == "smooth" else f"a road of ISO class {spec.roughness}"
+    return f"{road} with {counted(len(spec.events), 'event')}" if spec.events else road
 
 
 def joined(words: Sequence[str]) -> str:

@@ -42,7 +42,11 @@ def jit(function: Callable[..., Any]) -> Any:
 def jit_no_alias(function: Callable[..., Any]) -> Any:
     """Compile an inner loop whose array arguments never overlap; a*b + c may be fused."""
     compiled = numba.njit(
-        cache=True, nogil=True, error_model="numpy", fastmath={"contract", "nsz"}, forceinline=True,
+        cache=True,
+        nogil=True,
+        error_model="numpy",
+        fastmath={"contract", "nsz"},
+        forceinline=True,
         pipeline_class=_NoAlias,
     )
     return compiled(inspect.unwrap(function))

@@ -105,7 +105,8 @@ def _inherited(request: str) -> Renderer | None:
 def _find(request: str) -> Renderer:
     if request in _OFF:
         raise RenderingUnavailable(
-            f"MUJOCO_GL={request} turns rendering off; unset it, or go without pictures (--images none)."
+            f"MUJOCO_GL={request} turns rendering off; unset it, or let rays take the pictures "
+            "(--images raycast)."
         )
     if request not in _BY_REQUEST:
         raise RenderingUnavailable(
@@ -127,7 +128,7 @@ def _find(request: str) -> Renderer:
     wished = "" if request in _AUTOMATIC else f" with MUJOCO_GL={request}"
     raise RenderingUnavailable(
         f"nothing here can render{wished} ({'; '.join(refused)}): install OpenGL as root with `{INSTALL}`, "
-        "or go without pictures (--images none)."
+        "or let rays take the pictures (--images raycast)."
     )
 
 

@@ -11,17 +11,17 @@ import numpy as np
 
 from scenarios.scenario import GnssSensor
 from simbench.motion import Motion
+from simbench.sensors.clock import ticks_ns
 from simbench.truth import GnssReference
 
 
 def reference(
     sensor: GnssSensor, ego_antenna_m: np.ndarray, motion: Motion, target_id: int, end_ns: int,
-    rng: np.random.Generator,
+    rng: np.random.Generator, phase_ns: int,
 ) -> GnssReference:  # fmt: skip
-    """Fixes from t = 0 to `end_ns` of the target relative to the ego, with the parts of their error.
+    """Fixes from `phase_ns` to `end_ns` of the target relative to the ego, with the parts of their error.
     `ego_antenna_m` [3]: in the ego frame."""
-    period_ns = round(1e9 / sensor.rate_hz)
-    fix_ns = np.arange(0, end_ns + 1, period_ns, dtype=np.int64)
+    fix_ns = ticks_ns(sensor.rate_hz, phase_ns, end_ns)
     n = len(fix_ns)
     heading_error = np.deg2rad(sensor.heading_deg) * rng.standard_normal()
     bias = sensor.bias_m * rng.standard_normal((2, 1, 3))

@@ -367,6 +367,21 @@ def _place(body, rotation, position, bound, body_R, body_p, moving, out, path): 
                 path[t, m] = path[t - 1, m] + np.sqrt(step) + bound[i] * np.sqrt(turn)
 
 
+@jit
+def _bins(slope, low, width, first, last):  # type: ignore[no-untyped-def]
+    """Per fan of slopes [f k] and edge low + b width: the first step at or above it, and the first beyond."""
+    for f in range(slope.shape[0]):
+        up, over = 0, 0
+        for b in range(first.shape[1]):
+            edge = low + b * width
+            while up < slope.shape[1] and slope[f, up] < edge - 1e-12:
+                up += 1
+            while over < slope.shape[1] and slope[f, over] <= edge + 1e-12:
+                over += 1
+            first[f, b], last[f, b] = up, over
+        first[f, 0], last[f, first.shape[1] - 1] = 0, slope.shape[1]
+
+
 @jit_inline
 def _support(kind, size, x, y, z):  # type: ignore[no-untyped-def]
     """Half the extent of a geom along an axis whose absolute coordinates in its frame are given; a little
@@ -692,25 +707,50 @@ def _frames_of(a, table, key, weight, G, C):  # type: ignore[no-untyped-def]
             C[r, lane] = table[k, a, 9 + r] + w * (table[n, a, 9 + r] - table[k, a, 9 + r])
 
 
-@jit_inline
-def _slopes_of(kind, size, M, X, skew, slack, stretch):  # type: ignore[no-untyped-def]
-    """The interval of slopes at which a geom may be met by any of four fans; empty: (inf, -inf)."""
-    low, high = np.inf, -np.inf
+@jit_no_alias
+def _extent_of_box(size, M, extent):  # type: ignore[no-untyped-def]
+    """Half the extents [3 4] of a geom along the axes of four fans, whose axes in its frame are M."""
+    for a in range(3):
+        for lane in range(LANES):
+            x, y, z = abs(M[a, lane]), abs(M[3 + a, lane]), abs(M[6 + a, lane])
+            extent[a, lane] = x * size[0] + y * size[1] + z * size[2]
+
+
+@jit_no_alias
+def _extent_of_ellipsoid(size, M, extent):  # type: ignore[no-untyped-def]
+    for a in range(3):
+        for lane in range(LANES):
+            x, y, z = M[a, lane] * size[0], M[3 + a, lane] * size[1], M[6 + a, lane] * size[2]
+            extent[a, lane] = np.sqrt(x * x + y * y + z * z)
+
+
+@jit_no_alias
+def _extent_of_tube(size, ball, M, extent):  # type: ignore[no-untyped-def]
+    """A capsule (ball: 1), a cylinder (0)."""
+    for a in range(3):
+        for lane in range(LANES):
+            z = abs(M[6 + a, lane])
+            flat = 1.0 - z * z
+            flat = np.sqrt(flat if flat > 0.0 else 0.0)
+            extent[a, lane] = z * size[1] + size[0] * (ball + (1.0 - ball) * flat)
+
+
+@jit_no_alias
+def _slopes_of(X, extent, stretch, skew, low, high):  # type: ignore[no-untyped-def]
+    """Intervals of slopes [4] at which boxes X +- extent of the fans can be met; (inf, -inf): none."""
     for lane in range(LANES):
-        e = stretch * _support(kind, size, abs(M[0, lane]), abs(M[3, lane]), abs(M[6, lane]))
-        n = stretch * _support(kind, size, abs(M[2, lane]), abs(M[5, lane]), abs(M[8, lane]))
+        e, u = stretch * extent[0, lane] + 1e-9, stretch * extent[1, lane] + 1e-9
+        n = stretch * extent[2, lane] + 1e-9
         near, far = X[0, lane] - e, X[0, lane] + e
-        if far < 0.0 or abs(X[2, lane]) - n > skew * far:
-            continue
-        u = stretch * _support(kind, size, abs(M[1, lane]), abs(M[4, lane]), abs(M[7, lane]))
+        missed = (far <= 0.0) | (abs(X[2, lane]) - n > skew * far)
         bottom, top = X[1, lane] - u, X[1, lane] + u
-        if near > 1e-6:
-            low = min(low, bottom / near if bottom < 0.0 else bottom / far)
-            high = max(high, top / near if top > 0.0 else top / far)
-        else:
-            low = min(low, -np.inf if bottom < 0.0 else bottom / far)
-            high = max(high, np.inf if top > 0.0 else top / far)
-    return low - slack, high + slack
+        ahead = near > 1e-6
+        lowest = bottom / near if ahead else -np.inf
+        lowest = lowest if bottom < 0.0 else bottom / far
+        highest = top / near if ahead else np.inf
+        highest = highest if top > 0.0 else top / far
+        low[lane] = np.inf if missed else lowest
+        high[lane] = -np.inf if missed else highest
 
 
 @jit
@@ -747,6 +787,7 @@ def _cast_fans(  # type: ignore[no-untyped-def]
     )  # fmt: skip
     W4, P4, work, plane = np.empty((9, LANES)), np.empty((3, LANES)), np.empty((3, 3)), np.empty((5, 3))
     key4, weight4 = np.empty(LANES, np.int64), np.empty(LANES)
+    extent, lowest, highest = np.empty((3, LANES)), np.empty(LANES), np.empty(LANES)
     for superblock in range(start, stop, SUPERBLOCK):
         superstop = min(superblock + SUPERBLOCK, stop)
         many = _cull(
@@ -791,7 +832,17 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         _frames_of(row[i], table, key4, weight4, G, C)
                         _lanes(G, C, P4, W4, M, o, X)
                     stretch = 1.0 if row[i] < 0 else 1.01  # a frame between two keys is not quite rigid
-                    bottom, top = _slopes_of(kind[i], size[i], M, X, skew_max + slack, slack, stretch)
+                    if kind[i] == BOX:
+                        _extent_of_box(size[i], M, extent)
+                    elif kind[i] == ELLIPSOID:
+                        _extent_of_ellipsoid(size[i], M, extent)
+                    elif kind[i] == SPHERE:
+                        extent[:] = size[i, 0]
+                    else:
+                        _extent_of_tube(size[i], 1.0 if kind[i] == CAPSULE else 0.0, M, extent)
+                    _slopes_of(X, extent, stretch, skew_max + slack, lowest, highest)
+                    bottom = min(lowest[0], lowest[1], lowest[2], lowest[3]) - slack
+                    top = max(highest[0], highest[1], highest[2], highest[3]) + slack
                     if bottom > top:
                         continue
                     b0 = (bottom - low) * bins_per_slope
@@ -801,7 +852,10 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     j0 = first_step[group, int(max(b0, 0.0))]
                     j1 = last_step[group, int(min(b1, bins - 1.0))]
                     for lane in range(LANES):
-                        if _inside(kind[i], size[i], o[0, lane], o[1, lane], o[2, lane]):
+                        x0, y0, z0 = o[0, lane], o[1, lane], o[2, lane]
+                        if x0 * x0 + y0 * y0 + z0 * z0 > 1.01 * bound[i] * bound[i] + 1e-6:
+                            continue
+                        if _inside(kind[i], size[i], x0, y0, z0):
                             _lane_from_inside(kind[i], size[i], M, o, s, x, lane, i, best, who, facing, work)
                     if kind[i] == BOX:
                         _fans_box(size[i], M, o, s, x, j0, j1, i, best, who, facing)
@@ -827,6 +881,54 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         out_geom[at] = who[j, lane]
                         out_cosine[at] = facing[j, lane]
                         at += out_stride
+
+
+@jit
+def _cast_window(  # type: ignore[no-untyped-def]
+    kind, size, bound, row, still, table, path, key, weight, R, origin, pose_of, x, y, out_geom,
+):  # fmt: skip
+    """Pixels (x, y, 1) of the slopes x [c] ascending and y [r], every row with its own pose."""
+    rows, columns = y.shape[0], x.shape[0]
+    padded = rows + (-rows) % LANES
+    frame, pose = np.zeros((padded, 3, 3)), np.empty(padded, np.int64)
+    at = np.full(padded, -1, np.int64)
+    slopes = np.empty((padded, columns))
+    for f in range(padded):
+        r = min(f, rows - 1)
+        q = np.sqrt(1.0 + y[r] * y[r])
+        # Forward (0, y, 1) / q, right (1, 0, 0), and across both (0, 1, -y) / q.
+        frame[f, 1, 0], frame[f, 2, 0], frame[f, 0, 1] = y[r] / q, 1.0 / q, 1.0
+        frame[f, 1, 2], frame[f, 2, 2] = 1.0 / q, -y[r] / q
+        pose[f] = pose_of[r]
+        if f < rows:
+            at[f] = f * columns
+        for c in range(columns):
+            slopes[f, c] = x[c] / q
+    bins = columns + 1
+    low, high = np.inf, -np.inf
+    for f in range(rows):
+        low, high = min(low, slopes[f, 0]), max(high, slopes[f, columns - 1])
+    width = max((high - low) / (bins - 1), 1e-9)
+    first, last = np.empty((padded, bins), np.int32), np.empty((padded, bins), np.int32)
+    _bins(slopes, low, width, first, last)
+    groups = padded // LANES
+    slope, skew = np.empty((groups, columns, LANES)), np.zeros((groups, columns, LANES))
+    first_step, last_step = np.empty((groups, bins), np.int32), np.empty((groups, bins), np.int32)
+    for g in range(groups):
+        for c in range(columns):
+            for lane in range(LANES):
+                slope[g, c, lane] = slopes[g * LANES + lane, c]
+        for b in range(bins):
+            lowest, highest = first[g * LANES, b], last[g * LANES, b]
+            for lane in range(1, LANES):
+                lowest = min(lowest, first[g * LANES + lane, b])
+                highest = max(highest, last[g * LANES + lane, b])
+            first_step[g, b], last_step[g, b] = lowest, highest
+    range_m, cosine = np.empty(rows * columns), np.empty(rows * columns, np.float32)
+    _cast_fans(
+        kind, size, bound, row, still, table, path, key, weight, R, origin, pose, frame, slope, skew,
+        first_step, last_step, low, 1.0 / width, 0.0, 0.0, at, 1, 0, padded, range_m, out_geom, cosine,
+    )  # fmt: skip
 
 
 @jit

@@ -8,7 +8,7 @@ as `mj_ray` does, which is the oracle in the tests (ranges equal to 1e-9 m).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int, Int32, Int64
@@ -176,6 +176,24 @@ def place(
     return Placed(geoms=geoms, still=still[0], row=row, keys=keys, path_m=path_m)
 
 
+def some(placed: Placed, wanted: Int[np.ndarray, " n"]) -> Placed:
+    """Only the geoms `wanted`, numbered anew."""
+    geoms = placed.geoms
+    return replace(
+        placed,
+        geoms=Geoms(
+            kind=geoms.kind[wanted],
+            size_m=geoms.size_m[wanted],
+            body=geoms.body[wanted],
+            rotation=geoms.rotation[wanted],
+            position_m=geoms.position_m[wanted],
+            bound_m=geoms.bound_m[wanted],
+        ),
+        still=placed.still[wanted],
+        row=placed.row[wanted],
+    )
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fans:
     """Directions of a sensor as fans: ray j of fan f looks along e + slope u + skew n, frame = (e, u, n).
@@ -226,10 +244,9 @@ def make_fans(
     low, high = float(slope.min()), float(slope.max())
     bins = BINS_PER_STEP * slope.shape[1] + 1
     width = max((high - low) / (bins - 1), 1e-9)
-    edges = low + width * np.arange(bins)
-    first = np.array([np.searchsorted(row, edges - 1e-12) for row in slope])
-    last = np.array([np.searchsorted(row, edges + 1e-12, side="right") for row in slope])
-    first[:, 0], last[:, -1] = 0, slope.shape[1]
+    first = np.empty((len(slope), bins), dtype=np.int32)
+    last = np.empty_like(first)
+    kernel._bins(np.ascontiguousarray(slope), low, width, first, last)
 
     def padded(values: np.ndarray) -> np.ndarray:
         return np.concatenate([values, np.repeat(values[-1:], padding, axis=0)])
@@ -243,8 +260,8 @@ def make_fans(
         out_stride=out_stride,
         low=low,
         bins_per_slope=1.0 / width,
-        first_step=readonly(padded(first).reshape(-1, LANES, bins).min(axis=1), np.int32),
-        last_step=readonly(padded(last).reshape(-1, LANES, bins).max(axis=1), np.int32),
+        first_step=readonly(padded(first).reshape(-1, LANES, bins).min(axis=1)),
+        last_step=readonly(padded(last).reshape(-1, LANES, bins).max(axis=1)),
         skew_max=float(np.abs(skew).max()),
         slack=slack,
     )
@@ -297,6 +314,33 @@ def cast_fans(
         out.geom.reshape(-1),
         out.cosine.reshape(-1),
     )
+
+
+def cast_window(
+    placed: Placed,
+    wanted: Int[np.ndarray, " n"],
+    key: Int64[np.ndarray, " p"],
+    weight: Float64[np.ndarray, " p"],
+    R_world_camera: Float64[np.ndarray, "p 3 3"],
+    origin_m: Float64[np.ndarray, "p 3"],
+    pose: Int64[np.ndarray, " r"],
+    x: Float64[np.ndarray, " c"],
+    y: Float64[np.ndarray, " r"],
+) -> Int32[np.ndarray, "r c"]:
+    """The geom that each pixel ray (x, y, 1) of a camera meets first, among the geoms `wanted`; -1: none.
+
+    x ascends; row i of y has pose `pose[i]`; poses as for `cast_fans`.
+    """
+    geoms = placed.geoms
+    found = np.empty((len(y), len(x)), dtype=np.int32)
+    kernel._cast_window(
+        geoms.kind[wanted], geoms.size_m[wanted], geoms.bound_m[wanted], placed.row[wanted],
+        placed.still[wanted], placed.keys, placed.path_m, key, weight,
+        np.ascontiguousarray(R_world_camera), np.ascontiguousarray(origin_m), pose,
+        np.ascontiguousarray(x), np.ascontiguousarray(y), found.reshape(-1),
+    )  # fmt: skip
+    named = np.append(wanted, -1).astype(np.int32)
+    return named[found]
 
 
 def empty_hits(shape: tuple[int, ...]) -> Hits:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Int64
 
 from fusion.camera import PinholeCamera
 from fusion.geometry import Transform
@@ -14,29 +13,35 @@ from fusion.messages import Calibration
 from scenarios.scenario import CameraSensor, GnssSensor, ImuSensor, LidarSensor, Rig, Sensor
 from scenarios.seeding import stream
 from simbench.axes import T_parent_body, T_parent_optical, pinhole
+from simbench.sensors.clock import CameraTiming, camera_timing, drawn_ns
 from simbench.sensors.lidar import passing_offset_ns, period_ns
 
 TRAILING_SWEEPS = 3  # cameras and IMU go on after the last sweep, so that late messages still settle it
+BEYOND_NS = 300_000_000  # and so much longer GNSS and IMU
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraTiming:
-    """When one camera exposes. `mid_ns` [f]: true mid-exposure without faults; `stamp_ns` [f]: what it
-    claims."""
+class Phases:
+    """When sensors that run on their own measure first, after time 0."""
 
-    mid_ns: Int64[np.ndarray, " f"]
-    stamp_ns: Int64[np.ndarray, " f"]
+    gnss_ns: int
+    imu_ns: int
+    odometer_ns: int
 
 
 @dataclass(frozen=True, kw_only=True)
 class SensorRig:
-    """The sensors of a rig. Poses are in the ego frame at rest; `pinholes` are the true intrinsics."""
+    """The sensors of a rig. Poses are in the ego frame at rest; `pinholes` are the true intrinsics.
+
+    trigger_deg: the spin angle (LiDAR frame) that fires each triggered camera, the rig's pulse or its own.
+    """
 
     rig: Rig
     lidar_name: str
     lidar: LidarSensor
     cameras: Mapping[str, CameraSensor]
     pinholes: Mapping[str, PinholeCamera]
+    trigger_deg: Mapping[str, float]
     gnss_name: str | None
     gnss: GnssSensor | None
     imu_name: str | None
@@ -58,30 +63,45 @@ class SensorRig:
 
     def timing(self, camera: str, duration_s: float, seed: int) -> CameraTiming:
         """Exposures of one camera over the run, and a few more."""
-        sensor = self.cameras[camera]
-        period = period_ns(self.lidar)
-        offset = passing_offset_ns(self.lidar, sensor.trigger_deg) + round(sensor.exposure_ms * 0.5e6)
+        sensor, period = self.cameras[camera], period_ns(self.lidar)
+        run_ns = self.sweeps(duration_s) * period
         if sensor.trigger == "free_run":
-            phase_ms = stream(seed, "camera", camera, "phase").uniform(-sensor.phase_ms, sensor.phase_ms)
-            offset = max(offset + round(phase_ms * 1e6), 0)
+            first_ns = drawn_ns(sensor.phase_ms, stream(seed, "camera", camera, "phase"))
             period = round(1e9 / sensor.rate_hz)
-        count = int(np.ceil(self.sweeps(duration_s) * period_ns(self.lidar) / period)) + TRAILING_SWEEPS
-        mid = offset + period * np.arange(count, dtype=np.int64)
-        late = {
-            "mid_exposure": 0,
-            "trigger": -round(sensor.exposure_ms * 0.5e6),
-            "arrival": round(sensor.latency_ms * 1e6),
-        }[sensor.stamp]
-        return CameraTiming(mid_ns=mid, stamp_ns=mid + late)
+        else:
+            pulse_ns = passing_offset_ns(self.lidar, self.trigger_deg[camera])
+            first_ns = pulse_ns + round(sensor.delay_ms * 1e6)
+        frames = int(np.ceil(run_ns / period)) + TRAILING_SWEEPS
+        return camera_timing(sensor, first_ns, period, frames, stream(seed, "camera", camera, "host"))
+
+    def end_ns(self, duration_s: float, timing: Mapping[str, CameraTiming]) -> int:
+        """Until when GNSS and IMU go on: past the last sweep and the last image."""
+        last_ns = max((int(t.mid_ns[-1]) for t in timing.values()), default=0)
+        return max(last_ns, self.sweeps(duration_s) * period_ns(self.lidar)) + BEYOND_NS
+
+    def phases(self, seed: int) -> Phases:
+        """The first instants of GNSS, IMU and odometer in a run; 0 for what the rig does not carry."""
+
+        def drawn(phase_ms: float | tuple[float, float], *path: str) -> int:
+            return drawn_ns(phase_ms, stream(seed, *path, "phase"))
+
+        gnss, imu = self.gnss, self.imu
+        return Phases(
+            gnss_ns=drawn(gnss.phase_ms, "gnss") if gnss is not None else 0,
+            imu_ns=drawn(imu.phase_ms, "imu") if imu is not None else 0,
+            odometer_ns=drawn(imu.odometer_phase_ms, "odometer") if imu is not None else 0,
+        )
 
 
 def assemble(rig: Rig, sensors: Mapping[str, Sensor]) -> SensorRig:
-    """A rig and its sensor declarations by name on the rig. ValueError when it has not exactly one LiDAR."""
+    """A rig and its sensor declarations by name on the rig. ValueError: it has not exactly one LiDAR, or a
+    triggered camera has no angle."""
     poses = {}
     lidars: dict[str, LidarSensor] = {}
     cameras: dict[str, CameraSensor] = {}
     gnss: dict[str, GnssSensor] = {}
     imus: dict[str, ImuSensor] = {}
+    trigger_deg: dict[str, float] = {}
     for name, mount in rig.sensors.items():
         sensor = sensors[name]
         poses[name] = T_parent_body(mount.pose)
@@ -89,9 +109,9 @@ def assemble(rig: Rig, sensors: Mapping[str, Sensor]) -> SensorRig:
             lidars[name] = sensor
         elif isinstance(sensor, CameraSensor):
             poses[name] = T_parent_optical(mount.pose)
-            if mount.trigger_deg is not None:
-                sensor = sensor.model_copy(update={"trigger_deg": mount.trigger_deg})
             cameras[name] = sensor
+            if sensor.trigger == "lidar_angle":
+                trigger_deg[name] = _trigger_deg(rig, name)
         elif isinstance(sensor, GnssSensor):
             gnss[name] = sensor
         else:
@@ -107,6 +127,7 @@ def assemble(rig: Rig, sensors: Mapping[str, Sensor]) -> SensorRig:
         lidar=lidar,
         cameras=cameras,
         pinholes={name: pinhole(camera) for name, camera in cameras.items()},
+        trigger_deg=trigger_deg,
         gnss_name=next(iter(gnss), None),
         gnss=next(iter(gnss.values()), None),
         imu_name=next(iter(imus), None),
@@ -114,6 +135,14 @@ def assemble(rig: Rig, sensors: Mapping[str, Sensor]) -> SensorRig:
         T_ego_sensor=poses,
         T_ego_root=root_ego.inverse(),
     )
+
+
+def _trigger_deg(rig: Rig, camera: str) -> float:
+    own_deg = rig.sensors[camera].trigger_deg
+    angle_deg = rig.pulse_deg if own_deg is None else own_deg
+    if angle_deg is None:
+        raise ValueError(f"camera {camera} of rig {rig.name} waits for a pulse that the rig never sends")
+    return angle_deg
 
 
 def resized(rig: SensorRig, width_px: int, height_px: int) -> SensorRig:

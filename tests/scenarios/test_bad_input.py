@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scenarios.errors import BadInput, Where, dotted, nearest
+from scenarios.library import PACKAGE
 from scenarios.load import load_scenario
 
 GOOD = """\
@@ -255,6 +256,7 @@ body: vehicle
 sensors:
   lidar: {sensor: os1-64, pose: {xyz_m: [0, 0, 1.8]}}
   cam: {sensor: camera-40deg, pose: {xyz_m: [0, 0, 1.6]}}
+pulse_deg: 0
 source: judgement
 """
 
@@ -280,7 +282,15 @@ def test_a_rig_beside_the_file_is_found(tmp_path: Path) -> None:
         ("[0, 0, 1.8]", "[0.1, 0, 1.8]", 5, "the ego frame's origin lies below it"),
         ("cam:", "cameras:", 6, "no sensor may be called 'cameras'"),
         ("camera-40deg", "camera-40", 6, "did you mean 'camera-40deg'?"),
-        ("1.8]}", "1.8]}, trigger_deg: 3", 5, "counts for cameras only"),
+        ("1.8]}", "1.8]}, trigger_deg: 3", 5, "counts for triggered cameras only"),
+        (
+            "camera-40deg, ",
+            "camera-78deg-usb, trigger_deg: 3, ",
+            7,
+            "no camera of this rig waits for a pulse",
+        ),
+        ("camera-40deg, ", "camera-40deg, trigger_deg: 3, ", 7, "no camera of this rig waits for a pulse"),
+        ("pulse_deg: 0\n", "", 6, "waits for a pulse that the rig never sends"),
         ("name: mine", "name: yours", 1, "the rig's name is 'yours', the file's is 'mine'"),
         ("body: vehicle", "body: boat", 3, "allowed: vehicle, rider"),
         ("source: judgement\n", "", 1, "'source' is missing"),
@@ -318,13 +328,38 @@ source: judgement
         ("rate_hz: 10", "rate_hz: 20", "runs at 20 Hz, the lidar that triggers it at 10 Hz"),
         ("exposure_ms: 2", "exposure_ms: 200", "longer than a period of 100 ms"),
         ("latency_ms: 30", "latency_ms: 30\nphase_ms: 3", "counts for trigger free_run only"),
-        ("lidar_angle", "free_run\nphase_ms: 51", "more than half a period of 100 ms"),
+        ("latency_ms: 30", "latency_ms: 30\ndelay_ms: 101", "more than a period of 100 ms"),
+        ("lidar_angle", "free_run\ndelay_ms: 3", "counts for trigger lidar_angle only"),
+        ("lidar_angle", "free_run\nphase_ms: 101", "more than a period of 100 ms"),
+        ("lidar_angle", "free_run\nphase_ms: [9, 3]", "must be low, high with low <= high"),
+        ("lidar_angle", "free_run\nphase_ms: [9]", "needs at least 2 values"),
+        ("lidar_angle", "free_run\nphase_ms: soon", "must be a number or a list, is 'soon'"),
+        ("lidar_angle", "free_run\nphase_ms: -1", "must not be negative, is -1"),
+        ("latency_ms: 30", "latency_ms: 30\nreadout_ms: 5", "counts for a rolling shutter only"),
+        ("latency_ms: 30", "latency_ms: 30\nshutter: rolling", "needs a read-out time above 0"),
+        (
+            "latency_ms: 30",
+            "latency_ms: 30\nshutter: rolling\nreadout_ms: 99",
+            "2 ms of exposure and 99 ms of read-out are longer than a period of 100 ms",
+        ),
+        ("latency_ms: 30", "latency_ms: 30\nshutter: roling", "did you mean 'rolling'?"),
+        ("latency_ms: 30", "latency_ms: 30\nstamp_delay_ms: 9", "counts for stamp arrival only"),
+        ("latency_ms: 30", "latency_ms: 30\nstamp_jitter_ms: [1, 2]", "counts for stamp arrival only"),
+        ("mid_exposure", "arrival", "has no image before it is read out, 1 ms after mid-exposure"),
+        ("mid_exposure", "arrival\nstamp_delay_ms: [0.9, 5]", "has no image before it is read out, 1 ms"),
+        ("mid_exposure", "arrival\nstamp_delay_ms: 2000", "more than 1000 ms"),
+        ("mid_exposure", "middle", "end_of_readout"),
         (
             "lidar_angle\nexposure_ms: 2\nstamp: mid_exposure",
             "free_run\nexposure_ms: 2\nstamp: trigger",
             "no trigger",
         ),
         ("fov_deg: 40", "fov_deg: 200", "must be < 170, is 200"),
+        ("fov_deg: 40", "fov_deg: 40\nmotion_blur_samples: 4", "must be odd"),
+        ("exposure_ms: 2", "exposure_ms: 0\nmotion_blur_samples: 3", "needs an exposure_ms above 0"),
+        ("fov_deg: 40", "fov_deg: 40\njpeg_quality: 0", "must be >= 1"),
+        ("fov_deg: 40", "fov_deg: 40\nnoise: {full_well_e: 0, read_noise_e: 1}", "must be > 0"),
+        ("fov_deg: 40", "fov_deg: 40\nnoise: {full_well_e: 9, read_noise: 1}", "read_noise_e"),
         ("width_px: 960", "width_px: 960.0", "must be a whole number"),
         ("source: judgement\n", "", "'source' is missing"),
     ],
@@ -334,6 +369,30 @@ def test_a_sensor_that_does_not_fit_is_refused(tmp_path: Path, old: str, new: st
     (tmp_path / "sensors").mkdir()
     (tmp_path / "sensors" / "my-cam.yaml").write_text(CAMERA.replace(old, new, 1))
     error = refused(tmp_path, with_rig(tmp_path, RIG.replace("camera-40deg", "my-cam")))
+    assert says in str(error) and error.line is not None and error.file is not None
+
+
+@pytest.mark.parametrize(
+    ("sensor", "old", "new", "says"),
+    [
+        ("gnss-rtk", "phase_ms: [0, 200]", "phase_ms: [0, 201]", "more than a period of 200 ms"),
+        ("gnss-rtk", "phase_ms: [0, 200]", "phase_ms: [7, 5]", "must be low, high with low <= high"),
+        ("imu-mems", "phase_ms: [0, 10]", "phase_ms: 11", "more than a period of 10 ms"),
+        ("imu-mems", "odometer_phase_ms: [0, 20]", "odometer_phase_ms: 21", "more than a period of 20 ms"),
+        ("imu-mems", "odometer_rate_hz: 50", "odometer_rate_hz: 0", "must be > 0"),
+        ("imu-mems", "accel_bias_mps2: 0.05", "accel_bias_mps2: -1", "must not be negative"),
+        ("imu-mems", "accel_bias_mps2: 0.05\n", "", "'accel_bias_mps2' is missing"),
+    ],
+)
+def test_a_gnss_or_imu_that_does_not_fit_is_refused(
+    tmp_path: Path, sensor: str, old: str, new: str, says: str
+) -> None:
+    shipped = (PACKAGE / "sensors" / f"{sensor}.yaml").read_text()
+    assert f"\n{old}" in shipped
+    (tmp_path / "sensors").mkdir()
+    (tmp_path / "sensors" / "mine.yaml").write_text(shipped.replace(f"\n{old}", f"\n{new}", 1))
+    rig = RIG.replace("pulse_deg: 0", "  more: {sensor: mine, pose: {xyz_m: [0, 0, 1]}}\npulse_deg: 0")
+    error = refused(tmp_path, with_rig(tmp_path, rig))
     assert says in str(error) and error.line is not None and error.file is not None
 
 

@@ -196,7 +196,10 @@ def test_the_cars_cameras_share_one_pulse_and_the_riders_have_none() -> None:
     for name, trigger in (("car-six-cameras", "lidar_angle"), ("wearable-back", "free_run")):
         rig = load_rig(name)
         cameras = [s for s in rig_sensors(rig).values() if isinstance(s, CameraSensor)]
-        assert {(c.trigger, c.trigger_deg, c.stamp) for c in cameras} == {(trigger, 0.0, "mid_exposure")}
+        shutter, stamp = ("global", "trigger") if trigger == "lidar_angle" else ("rolling", "arrival")
+        assert {(c.trigger, c.shutter, c.stamp) for c in cameras} == {(trigger, shutter, stamp)}
+        assert rig.pulse_deg == (0.0 if trigger == "lidar_angle" else None)
+        assert all(mount.trigger_deg is None for mount in rig.sensors.values())
         assert {(c.width_px, c.height_px) for c in cameras} == {(960, 600)}
 
 

@@ -18,18 +18,28 @@ from scenarios.fault_set import (
     parse_fault_arguments,
     parse_faults,
 )
-from scenarios.faults import FAULTS, EdgeError, TriggerOffset, Vibration
+from scenarios.faults import FAULTS, EdgeError, RoadShake, TriggerOffset, Vibration
 from scenarios.severity import SEVERITIES, road_class, severe
 
 FILE = Where(file="f.yaml")
+WORDS = {0: "smooth", 0.25: "A", 0.5: "B", 1: "C"}
+
+
+def strength(name: str, number: float) -> float | str:
+    """That much of a fault: the number, or a word where its strength is one."""
+    return WORDS[number] if FAULTS[name].strength_words() else number
+
+
 # Plain inputs, parsed inside the tests: type checks draw at random, which a strategy must not.
-SETS = st.dictionaries(st.sampled_from(sorted(FAULTS)), st.sampled_from([0, 0.0, 0.5, 1]), max_size=5)
+SETS = st.dictionaries(st.sampled_from(sorted(FAULTS)), st.sampled_from([0, 0.0, 0.5, 1]), max_size=5).map(
+    lambda numbers: {name: strength(name, number) for name, number in numbers.items()}
+)
 CHANGES = st.lists(
     st.one_of(
         st.just("none"),
         st.just("demo"),
         st.tuples(st.sampled_from(sorted(FAULTS)), st.sampled_from([0, 0.25, 1])).map(
-            lambda p: f"{p[0]}={p[1]}"
+            lambda p: f"{p[0]}={strength(*p)}"
         ),
     ),
     max_size=4,
@@ -38,7 +48,7 @@ CHANGES = st.lists(
 NOTHING = FaultChange()
 CLEAR = FaultChange(clears=True)
 
-Raw = dict[str, float]
+Raw = dict[str, float | str]
 
 
 @given(raw=SETS)
@@ -82,7 +92,7 @@ def test_a_change_replaces_its_own_keys_and_leaves_the_others(raw: Raw, argument
 
 @given(raw=SETS)
 def test_a_fault_that_is_off_is_as_if_never_mentioned(raw: Raw) -> None:
-    without = {name: value for name, value in raw.items() if value != 0}
+    without = {name: value for name, value in raw.items() if value not in (0, "smooth")}
     found = parse_faults(raw, FILE)
     assert found == parse_faults(without, FILE)
     assert [spec.name for spec in found] == sorted(without)
@@ -96,11 +106,11 @@ def test_a_set_is_read_back_from_its_own_data(raw: Raw) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(FAULTS))
-def test_a_bare_number_sets_the_strength_and_zero_is_off(name: str) -> None:
-    kind = FAULTS[name]
-    bare, full = parse_faults({name: 0.5}, FILE), parse_faults({name: {kind.strength: 0.5}}, FILE)
-    assert bare == full and getattr(bare.specs[0], kind.strength) == 0.5
-    assert len(parse_faults({name: 0}, FILE)) == 0
+def test_a_bare_value_sets_the_strength_and_the_least_is_off(name: str) -> None:
+    kind, some = FAULTS[name], strength(name, 0.5)
+    bare, full = parse_faults({name: some}, FILE), parse_faults({name: {kind.strength: some}}, FILE)
+    assert bare == full and getattr(bare.specs[0], kind.strength) == some
+    assert len(parse_faults({name: strength(name, 0)}, FILE)) == 0
     assert (
         kind.name == name and (kind.__doc__ or "").count("Unit:") == 1 and "Source:" in (kind.__doc__ or "")
     )
@@ -174,6 +184,15 @@ def test_a_fault_set_may_be_a_file(tmp_path: Path) -> None:
         ("motion.flex_deg={sensors: []}", "names no camera"),
         ("motion.flex_deg={sensors: [a, a]}", "names a camera twice"),
         ("motion.flex_deg={uniform: [1, 2]}", "unknown key 'uniform'"),
+        ("motion.road", "needs a value, as in motion.road=E"),
+        ("motion.road=c", "did you mean 'C'?"),
+        ("motion.road=F", "allowed: smooth, A, B, C, D, E"),
+        ("motion.road=3", "allowed: smooth, A, B, C, D, E"),
+        ("motion.road=true", "must be one of smooth, A, B, C, D, E or a mapping, is true"),
+        ("motion.road={events: [{kind: bump, at_m: 9, height_m: 0.1}]}", "'length_m' is missing"),
+        ("motion.road={events: [{kind: hole, at_m: 9, height_m: 0.1, length_m: 1}]}", "allowed: bump, kerb"),
+        ("motion.road={events: [{kind: kerb, at_m: 9, height_m: 3, length_m: 1}]}", "must be <= 0.3, is 3"),
+        ("motion.road={events: [{kind: kerb, at_m: 9, height_m: 0, length_m: 1}]}", "must be > 0, is 0"),
         ("timing.trigger_offset_ms=1001", "must be <= 1000"),
         ("timing.trigger_offset_ms={jitter_ms: -1}", "jitter_ms: must not be negative"),
         ("calibration.rotation_deg={axis: up}", "allowed: random, roll, pitch, yaw"),
@@ -191,9 +210,22 @@ def test_a_bad_argument_is_refused_in_one_sentence(argument: str, says: str) -> 
 
 def test_a_camera_that_the_rig_lacks_is_refused() -> None:
     faults = parse_faults({"motion.flex_deg": {"rms_deg": 1, "sensors": ["cam-left"]}}, FILE)
-    faults.check_cameras(("cam-left", "cam-right"), FILE)
+    faults.check(("cam-left", "cam-right"), FILE)
     with pytest.raises(BadInput, match=r"f.yaml, motion.flex_deg.sensors: unknown camera 'cam-left'"):
-        faults.check_cameras(("cam-centre", "cam-right"), FILE)
+        faults.check(("cam-centre", "cam-right"), FILE)
+
+
+def test_two_faults_that_shake_the_same_body_are_refused() -> None:
+    both = parse_faults({"motion.road": "B", "motion.vibration_deg": 1}, FILE)
+    with pytest.raises(BadInput, match=r"motion.road and motion.vibration_deg both shake the body"):
+        both.check((), FILE)
+    parse_faults({"motion.road": "B", "motion.vibration_deg": 0}, FILE).check((), FILE)
+
+
+def test_a_smooth_road_with_a_bump_is_not_off() -> None:
+    bump = {"kind": "bump", "at_m": 20.0, "height_m": 0.08, "length_m": 0.9}
+    (spec,) = parse_faults({"motion.road": {"events": [bump]}}, FILE)
+    assert isinstance(spec, RoadShake) and spec.roughness == "smooth" and spec.events[0].track == "both"
 
 
 def test_severities_rise_and_make_valid_specs() -> None:

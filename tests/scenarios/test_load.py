@@ -161,7 +161,12 @@ def test_a_family_travels_between_processes() -> None:
 
 
 def test_everything_in_the_package_loads() -> None:
-    assert set(list_rigs()) == {"car-six-cameras", "wearable-back", "wearable-front"}
+    assert set(list_rigs()) == {
+        "car-six-cameras",
+        "car-six-cameras-vlp16",
+        "wearable-back",
+        "wearable-front",
+    }
     for rig in list_rigs():
         assert load_rig(rig) is load_rig(rig)
     for sensor in list_sensors():

@@ -365,7 +365,9 @@ def test_the_palette_holds_what_the_parts_and_the_ground_use_and_nothing_else() 
 @pytest.mark.parametrize("name", sorted(PALETTE))
 def test_a_palette_entry_is_complete_and_physical(name: str) -> None:
     entry = PALETTE[name]
-    assert set(entry) == {"per", "colours", "reflectivity", "specular", "shininess", "source"}
+    keys = {"per", "colours", "reflectivity", "specular", "shininess", "source"}
+    assert set(entry) - {"roughness_deg"} == keys
+    assert 0 <= entry.get("roughness_deg", 0) <= 45
     assert entry["per"] in ("instance", "scene")
     colours = np.array(entry["colours"], dtype=float)
     assert colours.ndim == 2

@@ -11,7 +11,8 @@ import numpy as np
 from fusion.geometry import Transform
 from scenarios.equipment import rig_sensors
 from scenarios.load import load_scenario
-from scenarios.scenario import LidarSensor, Path, ReturnNoise, Scenario, System
+from scenarios.scenario import CameraSensor, LidarSensor, Path, ReturnNoise, Scenario, System
+from simbench.looks import plain_looks
 from simbench.motion import Motion
 from simbench.path import Track, make_track
 from simbench.sensors import rays
@@ -87,6 +88,7 @@ class Shape:
     rotation: np.ndarray | None = None
     mover: int | None = None
     reflectivity: float = 0.8
+    roughness_gain: float = 0.0
 
 
 def straight(xy_m: tuple[float, float], heading_deg: float, speed_mps: float) -> Track:
@@ -120,20 +122,25 @@ def toy_world(shapes: Sequence[Shape], tracks: Sequence[Track]) -> World:
     return World(
         model=None,
         geoms=rays.Geoms(
-            kind=np.array([s.kind for s in shapes]),
-            size_m=np.array([s.size_m for s in shapes]),
-            body=np.array([0 if s.mover is None else s.mover + 1 for s in shapes]),
-            rotation=np.array([np.eye(3) if s.rotation is None else s.rotation for s in shapes]),
-            position_m=np.array([s.xyz_m for s in shapes]),
+            kind=np.array([s.kind for s in shapes], dtype=np.int32),
+            size_m=np.array([s.size_m for s in shapes]).reshape(-1, 3),
+            body=np.array([0 if s.mover is None else s.mover + 1 for s in shapes], dtype=np.int32),
+            rotation=np.array([np.eye(3) if s.rotation is None else s.rotation for s in shapes]).reshape(
+                -1, 3, 3
+            ),
+            position_m=np.array([s.xyz_m for s in shapes]).reshape(-1, 3),
             bound_m=np.array([bound_m(s.kind, s.size_m) for s in shapes]),
         ),
         geom_model_id=np.arange(len(shapes), dtype=np.int32),
         geom_object=np.array([GROUND if s.mover is None else s.mover for s in shapes], dtype=np.int32),
         reflectivity=np.array([s.reflectivity for s in shapes]),
+        roughness_gain=np.array([s.roughness_gain for s in shapes]),
+        looks=plain_looks(len(shapes)),
         objects=tuple(
             ObjectInfo(object_id=i, name=f"mover{i}", category="car", size_m=(1.0, 1.0, 1.0))
             for i in range(n)
         ),
+        scale=(1.0,) * n,
         box_centre_m=np.zeros((n, 3)),
         static_rotation=np.broadcast_to(np.eye(3), (n, 3, 3)).copy(),
         static_position_m=np.zeros((n, 3)),
@@ -152,6 +159,23 @@ def toy_motion(world: World, T_ego_lidar: Transform) -> Motion:
     return Motion(
         world=world, ego_actor=0, T_ego_root=Transform.identity(), T_ego_sensor={"lidar": T_ego_lidar}
     )
+
+
+def a_camera(**changes: object) -> CameraSensor:
+    """A plain camera: global shutter, no noise."""
+    fields: dict[str, object] = {
+        "kind": "camera",
+        "rate_hz": 10.0,
+        "width_px": 96,
+        "height_px": 60,
+        "fov_deg": 60.0,
+        "trigger": "free_run",
+        "exposure_ms": 2.0,
+        "stamp": "mid_exposure",
+        "latency_ms": 0.0,
+        "source": "a test",
+    }
+    return CameraSensor.model_validate({**fields, **changes})
 
 
 def ideal_lidar(**changes: object) -> LidarSensor:

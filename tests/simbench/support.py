@@ -148,7 +148,7 @@ def drawn_for(at: Stage, seed: int = 0) -> Drawn:
     """What a seed draws, without recording anything."""
     duration_s = at.system.duration_s
     timing = {name: at.rig.timing(name, duration_s, seed) for name in at.rig.cameras}
-    return draw(at.rig, at.world, at.faults, timing, duration_s, seed)
+    return draw(at.rig, at.world, at.faults, timing, at.system, seed)
 
 
 def write_scenario(folder: Path, scenario: Scenario) -> Path:
@@ -267,8 +267,8 @@ def without_faults(at: Stage) -> Callable[..., Drawn]:
     """Every injector replaced by the identity: a `draw` that draws nothing whatever it is asked for."""
 
     def nothing(*args: Any) -> Drawn:
-        rig, world, _, timing, duration_s, seed = args
-        return draw(rig, world, FaultSet(), timing, duration_s, seed)
+        rig, world, _, timing, system, seed = args
+        return draw(rig, world, FaultSet(), timing, system, seed)
 
     return nothing
 

@@ -74,7 +74,7 @@ def test_images_come_with_their_boxes_and_change_nothing_else() -> None:
     at = staged(duration_s=0.3, background=True)
     plain = recorded(at).recording
 
-    def grey(motion: object, camera: str, t_ns: int, pose: object) -> np.ndarray:
+    def grey(motion: object, camera: str, seq: int, t_ns: int) -> np.ndarray:
         return np.full((64, 96, 3), 7, dtype=np.uint8)
 
     shown = capture(at.system, at.rig, at.world, at.faults, CATEGORIES, 0, grey).recording
@@ -123,5 +123,8 @@ def test_an_early_camera_is_taken_before_its_stamp() -> None:
     at = staged(specs=(TriggerOffset(offset_ms=-20.0),), duration_s=0.3)
     recording = recorded(at).recording
     stamp = {(m.sensor, m.seq): m.stamp_ns for m in recording.messages if isinstance(m, Detections)}
+    on_time = {name: at.rig.timing(name, 0.3, 0) for name in at.rig.cameras}
     for image in recording.truth.images:
-        assert image.capture_ns - stamp[(image.sensor, image.seq)] == -20_000_000
+        timing = on_time[image.sensor]
+        assert image.capture_ns - timing.mid_ns[image.seq] == -20_000_000
+        assert stamp[(image.sensor, image.seq)] == timing.stamp_ns[image.seq]

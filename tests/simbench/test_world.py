@@ -230,8 +230,8 @@ def auc(a: np.ndarray, b: np.ndarray) -> float:
 def test_intensity_alone_does_not_tell_the_target_from_the_background(
     system: SystemName, record_property: Any
 ) -> None:
-    """Real returns within 40 m, as many of each seed. Among the ground's they do tell: it is seen under a
-    grazing angle and is dark; that AUC is reported, and ground removal is every pipeline's first step."""
+    """Real returns within 40 m, as many of each seed. With the ground's among them it tells a little more:
+    asphalt is darker than most things."""
     target, background, with_ground = [], [], []
     for seed in range(20):
         of = of_seed(system, seed)
@@ -263,3 +263,4 @@ def test_intensity_alone_does_not_tell_the_target_from_the_background(
     record_property("auc_with_ground", among_ground)
     assert sum(map(len, target)) > 800
     assert max(found, 1.0 - found) < 0.7, found
+    assert max(among_ground, 1.0 - among_ground) < 0.75, among_ground

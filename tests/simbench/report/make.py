@@ -28,6 +28,19 @@ GONE = (
 )
 
 
+class Watcher:
+    """A pipeline that wants images and finds nothing in them."""
+
+    def reset(self, calibration: object, categories: object) -> None:
+        pass
+
+    def update(self, measurement: object) -> None:
+        pass
+
+    def trajectories(self) -> tuple[()]:
+        return ()
+
+
 def rng(*words: object) -> np.random.Generator:
     """A generator that belongs to these words."""
     return np.random.Generator(np.random.PCG64(list(repr(words).encode())))

@@ -12,14 +12,13 @@ import numpy as np
 import pytest
 
 from fusion.messages import CameraImage, LidarScan
-from simbench.case import Job, JobResult
+from simbench.case import Images, Job, JobResult
 from simbench.report.page import write_report
-from simbench.report.pictures import Replay, explain_view, take_pictures
+from simbench.report.pictures import FOR_THE_READER, Replay, explain_view, take_pictures
 from simbench.report.video import encode, find_video, shown_views, write_video
 from simbench.run import run_job
 from simbench.sensors.gl import RenderingUnavailable
-from simbench.sensors.render import Renderer
-from simbench.stage import record, stage
+from simbench.stage import pictures, record, stage
 
 PIPELINES = ("static_projection", "probabilistic")
 SHORT = """
@@ -82,22 +81,22 @@ def test_scans_are_made_again_bit_by_bit(shaken: Job) -> None:
         np.testing.assert_array_equal(again.offset_ns, scan.offset_ns)
 
 
-def test_pictures_are_made_again_bit_by_bit(shaken: Job) -> None:
+@pytest.mark.parametrize("images", ["raycast", "gl"])
+def test_pictures_are_made_again_bit_by_bit(shaken: Job, images: Images) -> None:
+    """As the camera took them, but for what is left out for the reader: here the sensor has none of it."""
     with drawing():
         staged = stage(shaken)
-        pinholes = staged.rig.pinholes
-        with Renderer(staged.world) as renderer:
-            recording = record(
-                shaken,
-                staged,
-                lambda motion, name, t_ns, pose: renderer.rgb(motion, t_ns, pose, pinholes[name]),
-            ).recording
-        images = {(m.sensor, m.seq): m.rgb for m in recording.messages if isinstance(m, CameraImage)}
+        cameras = {n: c.model_copy(update=FOR_THE_READER) for n, c in staged.rig.cameras.items()}
+        plain = replace(staged, rig=replace(staged.rig, cameras=cameras))
+        asked = replace(shaken, images=images, pipelines=("tests.simbench.report.make:Watcher",))
+        with pictures(asked, plain) as picture:
+            recording = record(shaken, plain, picture).recording
+        taken = {(m.sensor, m.seq): m.rgb for m in recording.messages if isinstance(m, CameraImage)}
         true = next(t for t in recording.truth.images if t.sensor == "cam-front" and t.seq == 2)
         key = ("cam-front", true.capture_ns)
-        again = take_pictures(Replay(shaken), [key])[key]
+        again = take_pictures(Replay(shaken), [key], images)[key]
     assert again.std() > 5
-    np.testing.assert_array_equal(again, images["cam-front", 2])
+    np.testing.assert_array_equal(again, taken["cam-front", 2])
 
 
 def test_the_explained_choice_is_what_the_method_mapped(job: Job, result: JobResult) -> None:
@@ -127,9 +126,12 @@ def test_without_pictures_the_page_shows_points_on_a_plain_ground(result: JobRes
     assert "Step 3: modes of the distance" in text and "S*" in text
 
 
-def test_with_pictures_the_page_holds_them_and_stays_small(result: JobResult, tmp_path: Path) -> None:
+@pytest.mark.parametrize("images", ["raycast", "gl"])
+def test_with_pictures_the_page_holds_them_and_stays_small(
+    result: JobResult, tmp_path: Path, images: Images
+) -> None:
     with drawing():
-        path = write_report([result], tmp_path, command="x", images="gl", environment={})
+        path = write_report([result], tmp_path, command="x", images=images, environment={})
     text = path.read_text(encoding="utf-8")
     assert text.count('<image href="data:image/jpeg;base64,') == text.count('<svg class="crop"') >= 2
     assert len(text) < 5_000_000
@@ -139,8 +141,7 @@ def test_the_video_has_a_frame_per_scan_and_plays_four_times_slower(
     result: JobResult, tmp_path: Path
 ) -> None:
     av = pytest.importorskip("av")
-    with drawing():
-        path = write_video(result, tmp_path)
+    path = write_video(result, tmp_path)
     assert find_video(tmp_path, "short", "car", 3) == path
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
@@ -151,8 +152,7 @@ def test_the_video_has_a_frame_per_scan_and_plays_four_times_slower(
     assert decoded[0].shape[0] % 2 == decoded[0].shape[1] % 2 == 0
     assert decoded[0].std() > 20
     first = path.read_bytes()
-    with drawing():
-        assert write_video(result, tmp_path).read_bytes() == first
+    assert write_video(result, tmp_path).read_bytes() == first
 
 
 def test_what_is_encoded_is_decoded(tmp_path: Path) -> None:

@@ -46,6 +46,9 @@ def test_lists_are_joined_as_people_do(given: list[str], text: str) -> None:
 
 def test_faults_are_named_with_the_number_that_sets_them() -> None:
     assert fault_words(faults("demo")) == "50 ms trigger offset and 1.1 deg vibration"
+    assert fault_words(faults("motion.road=C")) == "a road of ISO class C"
+    bump = "motion.road={events: [{kind: bump, at_m: 30, height_m: 0.08, length_m: 0.9}]}"
+    assert fault_words(faults(bump)) == "a smooth road with 1 event"
 
 
 def test_our_pipelines_have_plain_names_and_a_users_keeps_its_own() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from unittest import mock
 
 import mujoco
 import numpy as np
@@ -15,7 +16,8 @@ from fusion.geometry import Transform, rotation_rpy
 from simbench.axes import R_BODY_OPTICAL
 from simbench.motion import at
 from simbench.sensors import rays
-from simbench.sensors.boxes import View, outline_px, true_box
+from simbench.sensors.boxes import View, true_box
+from simbench.sensors.outline import outline_px
 from tests.simbench.scenes import Stage, bound_m, scripted_motion, staged
 
 CAMERA = PinholeCamera(fx_px=500.0, fy_px=480.0, cx_px=320.0, cy_px=240.0, width_px=640, height_px=480)
@@ -161,7 +163,7 @@ def test_a_distorted_camera_is_refused() -> None:
     view = view_of([BEHIND, BEHIND])
     bent = replace(CAMERA, distortion=(0.1, 0.0, 0.0, 0.0, 0.0))
     with pytest.raises(ValueError, match="undistorted"):
-        View(view.geoms, view.rotation, view.position_m, view.T_world_camera, bent)
+        View(view.geoms, np.eye(3)[None], np.zeros((1, 3)), view.T_world_camera, bent)
 
 
 # -- the catalogue ----------------------------------------------------------------------------------------
@@ -202,7 +204,7 @@ def test_boxes_are_the_extent_of_rays_through_every_pixel(scene: Stage, name: st
 
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
-def test_leaving_out_far_geoms_never_changes_what_is_seen(seed: int) -> None:
+def test_a_window_of_pixels_is_cast_like_rays_one_by_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
     shapes = [
         (
@@ -216,18 +218,27 @@ def test_leaving_out_far_geoms_never_changes_what_is_seen(seed: int) -> None:
         rotation=rotation_rpy(*rng.uniform(-0.3, 0.3, 3)) @ R_BODY_OPTICAL, translation_m=np.zeros(3)
     )
     plain = view_of(shapes)  # type: ignore[arg-type]
-    view = View(plain.geoms, plain.rotation, plain.position_m, turned, CAMERA)
-    for number in range(0, 30, 3):
-        mask = np.arange(30) == number
-        box = true_box(view, number, mask, 4.0)
-        if box is None:
-            continue
-        x0, y0, x1, y1 = box.amodal_px
-        us, vs = (
-            np.arange(max(int(x0), 0), min(int(x1) + 1, 640), 3),
-            np.arange(max(int(y0), 0), min(int(y1) + 1, 480), 3),
-        )
-        around = view.near_box((x0, y0, x1, y1), mask)
-        every = view.cast(us, vs, np.ones(30, dtype=bool))
-        own = view.cast(us, vs, mask) >= 0  # elsewhere farther geoms may be left out
-        assert np.array_equal(every[own], view.cast(us, vs, around)[own])
+    R, p = np.eye(3)[None], np.zeros((1, 3))
+    view = View(plain.geoms, R, p, turned, CAMERA)
+    us, vs = np.arange(3, 640, int(rng.integers(1, 60))), np.arange(0, 480, int(rng.integers(1, 50)))
+    mask = rng.random(30) < 0.7
+    x, y = (us + 0.5 - CAMERA.cx_px) / CAMERA.fx_px, (vs + 0.5 - CAMERA.cy_px) / CAMERA.fy_px
+    slow = rays.cast_pixels(plain.geoms, mask, R, p, turned.rotation, turned.translation_m, x, y)
+    assert np.array_equal(view.cast(us, vs, mask), slow.geom)
+
+
+@pytest.mark.parametrize("size_m", [0.05, 0.4, 1.5])
+def test_how_large_an_object_looks_never_changes_how_its_box_is_found(size_m: float) -> None:
+    """Pixel by pixel below a size, a grid and bands above it: the same extent."""
+    ball = (rays.SPHERE, (size_m, 0.0, 0.0), (6.0, 0.3, 0.2))
+    view = view_of([ball, (rays.BOX, (0.1, 0.3, 0.2), (4.0, 0.1, 0.3))])
+    mask = np.array([True, False])
+    found = []
+    for whole_px in (0, 10**9):
+        with mock.patch("simbench.sensors.boxes.WHOLE_PX", whole_px):
+            found.append(true_box(view, 0, mask, 4.0))
+    few, many = found
+    assert few is not None and many is not None
+    assert few.visible_px == many.visible_px
+    assert few.amodal_px == many.amodal_px
+    assert few.visible_fraction == pytest.approx(many.visible_fraction, abs=0.1)

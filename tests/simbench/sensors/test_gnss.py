@@ -53,8 +53,10 @@ def reference(
     antenna: tuple[float, float, float] = (0.0, 0.0, 0.0),
     seed: int = 0,
     end_s: float = 6.0,
+    phase_ns: int = 0,
 ) -> GnssReference:
-    return gnss.reference(sensor, np.array(antenna), motion, 1, round(end_s * S), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    return gnss.reference(sensor, np.array(antenna), motion, 1, round(end_s * S), rng, phase_ns)
 
 
 def exact(motion: Motion, t_ns: np.ndarray) -> np.ndarray:
@@ -148,6 +150,12 @@ def test_fixes_come_at_the_rate_and_are_known_after_the_latency() -> None:
     found = reference(receiver(latency_ms=20.0), two_drives(), end_s=1.0)
     assert np.array_equal(found.fix_ns, np.arange(0, S + 1, 200 * MS))
     assert np.array_equal(found.available_ns - found.fix_ns, np.full(6, 20 * MS))
+
+
+def test_the_first_fix_comes_at_the_phase() -> None:
+    found = reference(receiver(), two_drives(), end_s=1.0, phase_ns=130 * MS)
+    assert np.array_equal(found.fix_ns, np.arange(130, 1001, 200) * MS)
+    np.testing.assert_allclose(found.centre_ego_m, exact(two_drives(), found.fix_ns), atol=1e-9)
 
 
 def test_a_fix_holds_from_when_it_is_known_not_from_when_it_was_taken() -> None:

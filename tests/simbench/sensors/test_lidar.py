@@ -16,7 +16,7 @@ from scenarios.scenario import LidarSensor, ReturnNoise
 from scenarios.seeding import stream
 from simbench.motion import Motion
 from simbench.path import Track
-from simbench.sensors import lidar, rays
+from simbench.sensors import lidar, rays, returns
 from simbench.truth import ScanTruth
 from simbench.world import GROUND, World
 from tests.simbench.scenes import (
@@ -51,6 +51,11 @@ def scan_of(
     return lidar.sweep("lidar", sensor, motion, start_ns, 0, rng)
 
 
+def endless() -> LidarSensor:
+    """An ideal LiDAR that sees whatever its beams meet."""
+    return lidar.without(ideal_lidar(), "range_law")
+
+
 def os1() -> LidarSensor:
     sensor = load_sensor("os1-64")
     assert isinstance(sensor, LidarSensor)
@@ -66,7 +71,7 @@ def scene() -> Stage:
 
 
 def test_on_a_plane_every_range_is_the_closed_form_to_a_micrometre() -> None:
-    scan, truth = scan_of(toy_motion(toy_world([GROUND_PLANE], [STILL]), ABOVE), ideal_lidar())
+    scan, truth = scan_of(toy_motion(toy_world([GROUND_PLANE], [STILL]), ABOVE), endless())
     down = np.asarray(ideal_lidar().elevation_deg)[scan.ring]
     assert len(scan.xyz_m) == 8 * 256
     np.testing.assert_allclose(truth.true_range_m, HEIGHT_M / np.sin(np.deg2rad(-down)), rtol=0, atol=1e-6)
@@ -78,7 +83,7 @@ def test_on_a_plane_every_range_is_the_closed_form_to_a_micrometre() -> None:
 def test_on_a_sphere_every_range_is_the_closed_form_to_a_micrometre() -> None:
     centre, radius = np.array([12.0, 3.0, 1.5]), 2.0
     motion = toy_motion(toy_world([ball((12.0, 3.0, 1.5), radius)], [STILL]), ABOVE)
-    _, truth = scan_of(motion, ideal_lidar())
+    _, truth = scan_of(motion, endless())
     table = lidar.beam_table(ideal_lidar())
     c = centre - [0.0, 0.0, HEIGHT_M]
     along = table.direction @ c
@@ -92,7 +97,7 @@ def test_without_noise_a_point_is_its_true_range_along_its_beam(scene: Stage) ->
     sensor = os1()
     scan, truth = lidar.sweep("lidar", sensor, shaken_motion(scene), 300 * MS, 3, None)
     table = lidar.beam_table(sensor)
-    column = np.searchsorted(table.fire_offset_ns, scan.offset_ns)
+    column = np.searchsorted(table.column_offset_ns, scan.offset_ns)
     xyz = truth.true_range_m[:, None] * table.direction[column, scan.ring]
     np.testing.assert_allclose(scan.xyz_m, xyz, rtol=2e-7, atol=1e-7)
     assert len(scan.xyz_m) > 10_000
@@ -130,13 +135,13 @@ def test_the_front_passes_a_quarter_turn_after_the_start_which_is_25_ms() -> Non
     assert lidar.passing_offset_ns(sensor, 180.0) == 75 * MS
     assert lidar.passing_offset_ns(sensor.model_copy(update={"clockwise": False}), 0.0) == 75 * MS
     table = lidar.beam_table(sensor)
-    column = int(np.searchsorted(table.fire_offset_ns, 25 * MS))
+    column = int(np.searchsorted(table.column_offset_ns, 25 * MS))
     azimuth = np.rad2deg(np.arctan2(table.direction[column, :, 1], table.direction[column, :, 0]))
     np.testing.assert_allclose(azimuth, sensor.azimuth_offset_deg, atol=1e-9)
 
 
 def test_columns_fire_evenly_within_one_period() -> None:
-    offsets = lidar.beam_table(os1()).fire_offset_ns
+    offsets = lidar.beam_table(os1()).column_offset_ns
     assert offsets[0] == 0
     assert offsets[-1] < 100 * MS
     assert set(np.diff(offsets)) <= {97_656, 97_657}
@@ -314,6 +319,7 @@ def test_the_wearer_hides_part_of_the_scene_and_is_in_the_truth(scene: Stage) ->
         geom_model_id=scene.world.geom_model_id[without],
         geom_object=scene.world.geom_object[without],
         reflectivity=scene.world.reflectivity[without],
+        roughness_gain=scene.world.roughness_gain[without],
     )
     motion = scripted_motion(scene)
     _, naked = lidar.sweep("lidar", os1(), replace(motion, world=bare), 0, 0, None)
@@ -329,8 +335,8 @@ def wall_at(range_m: float, reflectivity: float) -> Motion:
 
 def test_the_range_law_passes_the_data_sheets_two_points() -> None:
     sensor = os1()
-    np.testing.assert_allclose(lidar.max_range_m(sensor, np.array([0.1, 0.8])), [40.0, 120.0])
-    assert (np.diff(lidar.max_range_m(sensor, np.linspace(0.0, 1.0, 50))) >= 0).all()
+    np.testing.assert_allclose(returns.max_range_m(sensor, np.array([0.1, 0.8])), [40.0, 120.0])
+    assert (np.diff(returns.max_range_m(sensor, np.linspace(0.0, 1.0, 50))) >= 0).all()
 
 
 @pytest.mark.parametrize(
@@ -341,7 +347,7 @@ def test_the_share_of_returns_follows_the_range_law(range_m: float, reflectivity
     scan, _ = scan_of(wall_at(range_m, reflectivity), sensor, seed=1)
     n = 1024 * 16
     share = 1.0 / (
-        1.0 + np.exp((range_m / lidar.max_range_m(sensor, np.array([reflectivity]))[0] - 1.0) / 0.04)
+        1.0 + np.exp((range_m / returns.max_range_m(sensor, np.array([reflectivity]))[0] - 1.0) / 0.04)
     )
     assert len(scan.xyz_m) / n == pytest.approx(share, abs=4.5 * np.sqrt(share * (1.0 - share) / n) + 1e-4)
 
@@ -356,8 +362,8 @@ def test_range_noise_has_the_spread_of_its_return_strength_and_no_bias(
     sensor = ideal_lidar(noise=noise, columns=1024)
     scan, truth = scan_of(wall_at(range_m, reflectivity), sensor, seed=2)
     error = np.linalg.norm(scan.xyz_m.astype(np.float64), axis=1) - truth.true_range_m
-    strength = (lidar.max_range_m(sensor, np.array([reflectivity])) / range_m) ** 2
-    sd = lidar.range_noise_m(sensor, strength)[0]
+    strength = (returns.max_range_m(sensor, np.array([reflectivity])) / range_m) ** 2
+    sd = returns.range_noise_m(sensor, strength)[0]
     n = len(error)
     assert 0.015 <= sd <= 0.10
     assert np.std(error) == pytest.approx(sd, rel=5.0 / np.sqrt(2.0 * n))
@@ -365,8 +371,8 @@ def test_range_noise_has_the_spread_of_its_return_strength_and_no_bias(
 
 
 def test_noise_by_strength_is_the_data_sheets_at_high_medium_and_low() -> None:
-    noise = lidar.range_noise_m(os1(), np.array([1e-9, 1.0, 4.0, 16.0, 1e6]))
-    np.testing.assert_allclose(noise, [0.10, 0.10, 0.03, 0.015, 0.015])
+    noise = returns.range_noise_m(os1(), np.array([1e-9, 1.0, 100 / 12, 250 / 12, 1e6]))
+    np.testing.assert_allclose(noise, [0.10, 0.10, 0.03, 0.015, 0.015], rtol=1e-3)
 
 
 def test_ranges_come_in_steps_of_the_resolution() -> None:
@@ -396,7 +402,7 @@ def test_false_returns_come_at_their_rate_where_nothing_returned() -> None:
         toy_motion(toy_world([ball((500.0, 0.0, 0.0), 0.1)], [STILL]), ABOVE), sensor, seed=5
     )
     n = 4096 * 16
-    expected = 0.02 * (1.0 - sensor.min_range_m / lidar.MAX_FALSE_RANGE_M)
+    expected = 0.02 * (1.0 - sensor.min_range_m / returns.MAX_FALSE_RANGE_M)
     assert len(scan.xyz_m) / n == pytest.approx(expected, abs=5.0 * np.sqrt(expected / n))
     assert (truth.object_id == GROUND).all()
     assert (truth.part_id == -1).all()
@@ -405,8 +411,8 @@ def test_false_returns_come_at_their_rate_where_nothing_returned() -> None:
 
 
 def test_the_noise_of_a_beam_does_not_depend_on_the_scene() -> None:
-    """A ball appears: no other point changes by a bit."""
-    sensor = os1()
+    """A ball appears: no other point changes by a bit (beams of no width, which mix nothing at its rim)."""
+    sensor = lidar.without(os1(), "divergence")
     plain = toy_world([GROUND_PLANE, ball((0.0, 0.0, HEIGHT_M), 60.0)], [STILL])
     with_ball = toy_world(
         [GROUND_PLANE, ball((0.0, 0.0, HEIGHT_M), 60.0), ball((12.0, 3.0, 1.0), 1.0)], [STILL]
@@ -431,5 +437,30 @@ def test_the_same_stream_gives_the_same_scan_to_the_bit(scene: Stage) -> None:
 
 
 def test_intensity_is_reflectivity_times_the_cosine_of_incidence() -> None:
-    scan, truth = scan_of(toy_motion(toy_world([GROUND_PLANE], [STILL]), ABOVE), ideal_lidar())
+    scan, truth = scan_of(toy_motion(toy_world([GROUND_PLANE], [STILL]), ABOVE), endless())
     np.testing.assert_allclose(scan.intensity, 0.2 * np.cos(truth.incidence_rad), atol=1e-6)
+
+
+def test_rough_ground_sends_back_more_at_grazing_incidence() -> None:
+    rough = replace(GROUND_PLANE, roughness_gain=0.4)
+    scan, truth = scan_of(toy_motion(toy_world([rough], [STILL]), ABOVE), endless())
+    angle = truth.incidence_rad
+    expected = 0.2 * (np.cos(angle) + 0.4 * np.sin(angle) ** 2)
+    np.testing.assert_allclose(scan.intensity, expected, atol=1e-6)
+
+
+def test_an_ideal_sensor_sees_to_where_the_real_one_misses_every_second_return() -> None:
+    """Its reach is a limit, not an error: sharp at R(rho)."""
+    reach = float(returns.max_range_m(os1(), np.array([0.3]))[0])
+    for range_m, points in ((0.999 * reach, 64 * 1024), (1.001 * reach, 0)):
+        assert len(scan_of(wall_at(range_m, 0.3), os1())[0].xyz_m) == points
+
+
+def test_every_point_belongs_to_the_object_of_its_part(scene: Stage) -> None:
+    scan, truth = lidar.sweep("lidar", os1(), shaken_motion(scene), 200 * MS, 2, np.random.default_rng(3))
+    real = truth.part_id >= 0
+    assert np.array_equal(truth.object_id[real], scene.world.geom_object[truth.part_id[real]])
+    assert (truth.object_id[~real] == GROUND).all()
+    objects = np.unique(truth.object_id)
+    assert sum(int((truth.object_id == i).sum()) for i in objects) == len(scan.xyz_m)
+    assert len(objects) > 8

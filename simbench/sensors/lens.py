@@ -1,0 +1,76 @@
+"""Where every pixel looks: directions of a whole image through a pinhole with Brown-Conrady distortion."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float64
+
+from fusion.camera import PinholeCamera
+from fusion.geometry import readonly
+from scenarios.errors import BadInput
+from simbench.sensors import rays
+
+STEP = 1e-6  # of the finite differences that tell a fold
+
+
+@lru_cache(maxsize=8)
+def pixel_directions(camera: PinholeCamera) -> Float64[np.ndarray, "h w 3"]:
+    """Unit vectors in the optical frame (x right, y down, z forward) through the pixels' centres.
+
+    Pixel (row r, column c) has its centre at (u, v) = (c + 0.5, r + 0.5). Read-only, kept per camera. Raises
+    BadInput where a pixel has no direction, or the lens folds the picture over itself.
+    """
+    u, v = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)
+    slope = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1))
+    if any(camera.distortion):
+        _check(slope, camera)
+    direction = np.empty((camera.height_px, camera.width_px, 3))
+    direction[..., :2] = slope.reshape(camera.height_px, camera.width_px, 2)
+    direction[..., 2] = 1.0
+    direction /= np.sqrt(np.einsum("hwi,hwi->hw", direction, direction))[..., None]
+    return readonly(direction)
+
+
+@lru_cache(maxsize=8)
+def row_planes(
+    camera: PinholeCamera,
+) -> tuple[Float64[np.ndarray, "h 3 3"], Float64[np.ndarray, "h w"], Float64[np.ndarray, "h w"]]:
+    """The same directions row by row: frames (ahead, across, normal) and, in them, slopes that ascend with u
+    and skews (`rays.Fans`). Raises BadInput as `pixel_directions`."""
+    direction = pixel_directions(camera)
+    # The plane of a row's ends (any plane near it will do: a bent row leaves it by its skew).
+    across = direction[:, -1] - direction[:, 0]
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    ahead = direction.mean(axis=1)
+    ahead -= np.einsum("hi,hi->h", ahead, across)[:, None] * across
+    ahead /= np.linalg.norm(ahead, axis=1)[:, None]
+    frame = np.stack([ahead, across, np.cross(ahead, across)], axis=2)
+    along = np.einsum("hij,hwi->hwj", frame, direction)
+    slope = np.maximum.accumulate(along[..., 1] / along[..., 0], axis=1)
+    return readonly(frame), readonly(slope), readonly(along[..., 2] / along[..., 0])
+
+
+@lru_cache(maxsize=8)
+def row_fans(camera: PinholeCamera) -> rays.Fans:
+    """All rows as fans for `rays.cast_fans`, each with a pose of its own; results lie row by row."""
+    frame, slope, skew = row_planes(camera)
+    rows = np.arange(len(frame))
+    return rays.make_fans(frame, slope, skew, rows, rows * camera.width_px, 1)
+
+
+def _check(slope: Float64[np.ndarray, "n 2"], camera: PinholeCamera) -> None:
+    """Every pixel has a bearing, and the lens keeps its orientation there: it was not found beyond a fold."""
+    lost = ~np.isfinite(slope).all(axis=1)
+    flat = np.column_stack([np.where(lost[:, None], 0.0, slope), np.ones(len(slope))])
+    here = camera.project(flat)
+    right = camera.project(flat + np.array([STEP, 0.0, 0.0])) - here
+    down = camera.project(flat + np.array([0.0, STEP, 0.0])) - here
+    lost |= right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0] <= 0.0
+    if lost.any():
+        row, column = divmod(int(np.flatnonzero(lost)[0]), camera.width_px)
+        raise BadInput(
+            f"the lens distortion {camera.distortion} gives pixel ({column}, {row}) no direction: it is too "
+            "strong for this field of view"
+        )
