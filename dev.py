@@ -8,8 +8,9 @@
     python3 dev.py lock [ARGS]    make the locks again; needs uv (ARGS for `uv pip compile`, e.g. --upgrade)
 
 Every package is installed from `requirements.lock` with its hash checked, by uv where it is found, else by
-pip: tools from `requirements-dev.lock`; what benchmarks compare with from `requirements-bench.lock`, for
-scripts under tests/benchmarks only. What is already installed is not installed again.
+pip: tools, and a Mesa to test `--images gl` with, from `requirements-dev.lock`; what benchmarks compare with
+from `requirements-bench.lock`, for scripts under tests/benchmarks only. What is already installed is not
+installed again.
 """
 
 from __future__ import annotations
@@ -267,8 +268,11 @@ def pinned(lock_text: str, *, marker: str = "") -> list[str]:
     return sorted({name for name, condition in found if not marker or condition == marker})
 
 
-def compile_lock(lock: str, group: str, arguments: Sequence[str], *, left_out: Sequence[str]) -> str:
-    """The text of one lock. Pins of the lock that exists are kept where they still fit."""
+def compile_lock(
+    lock: str, group: str, arguments: Sequence[str], *, left_out: Sequence[str], earlier: Sequence[str]
+) -> str:
+    """The text of one lock. Pins of the lock that exists are kept where they still fit; what an earlier lock
+    pins has the same version in this one, since all go to one `.venv`."""
     import shutil
     import subprocess
 
@@ -280,8 +284,8 @@ def compile_lock(lock: str, group: str, arguments: Sequence[str], *, left_out: S
     command += ["--no-header", "--group", group, *arguments, "pyproject.toml"]
     for name in left_out:
         command += ["--no-emit-package", name]
-    if lock != RUN_LOCK:
-        command += ["--constraint", RUN_LOCK]
+    for other in earlier:
+        command += ["--constraint", other]
     subprocess.run([*command, "--output-file", lock], check=True, cwd=ROOT)
     with open(os.path.join(ROOT, lock), encoding="utf-8") as file:
         return file.read().partition("\n# The following packages were excluded")[0] + "\n"
@@ -292,15 +296,17 @@ def lock_all(arguments: Sequence[str]) -> int:
 
     head = f"{FINGERPRINT}{fingerprint()}\n# Made by `python3 dev.py lock` from pyproject.toml.\n"
     run_names: list[str] = []
+    done: list[str] = []
     for lock, group in ((RUN_LOCK, "lock"), (DEV_LOCK, "dev"), (BENCH_LOCK, "bench")):
         try:
-            text = compile_lock(lock, group, arguments, left_out=run_names)
+            text = compile_lock(lock, group, arguments, left_out=run_names, earlier=done)
             never = pinned(text, marker="sys_platform == 'never'")  # MuJoCo's viewers: see pyproject.toml
-            text = compile_lock(lock, group, arguments, left_out=[*run_names, *never])
+            text = compile_lock(lock, group, arguments, left_out=[*run_names, *never], earlier=done)
         except subprocess.CalledProcessError as error:
             raise fail("uv could not make " + lock + "; it says above why.") from error
         with open(os.path.join(ROOT, lock), "w", encoding="utf-8") as file:
             file.write(head + text)
+        done.append(lock)
         run_names = run_names or [*pinned(text), *never]
     return 0
 

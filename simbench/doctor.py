@@ -1,7 +1,7 @@
 """What this machine offers to simbench, and what is missing: `simbench doctor`.
 
-`report()` only looks and returns data; `main()` prints it. Reading takes a second, most of it the renderer's
-probe.
+`report()` looks and returns data; `main()` prints it. That takes a few seconds: it takes a small picture by
+rays and lets OpenGL draw one. The first picture after an install compiles the ray kernels.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import platform
 import shutil
 import sys
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,15 +21,27 @@ from simbench.sensors import gl
 PACKAGES = ("mujoco", "numpy", "scipy", "opencv-python-headless", "numba", "pydantic", "matplotlib", "av")
 NEEDED_DISK_B = 1e9
 NEEDED_MEMORY_B = 2e9
+PICTURE_PX = (64, 40)
+WAIT = "looking ... (the first time up to a minute: the ray kernels are compiled)"
+BOARD_M = 7.5  # from the front camera of the scenario static-board to its board
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:
-    """One line. `ok` is false where something is missing; `value` then says what to do."""
+    """One line. `ok` is false where something is missing; `value` then says what to do.
+
+    only_for: what alone does not work without it; empty: everything needs it.
+    """
 
     name: str
     value: str
     ok: bool = True
+    only_for: str = ""
+
+    @property
+    def state(self) -> str:
+        """`ok`, `missing`, or `absent` where only `only_for` needs it."""
+        return "ok" if self.ok else "absent" if self.only_for else "missing"
 
 
 def report() -> tuple[Finding, ...]:
@@ -40,7 +53,8 @@ def report() -> tuple[Finding, ...]:
         _memory(),
         _disk(),
         *_packages(),
-        *_renderer(),
+        _pictures(),
+        *_opengl(),
         *_lock(),
     )
 
@@ -80,16 +94,46 @@ def _packages() -> Iterable[Finding]:
             yield Finding(name=name, value="missing; reinstall simbench", ok=False)
 
 
-def _renderer() -> Iterable[Finding]:
+def _pictures() -> Finding:
+    """Whether rays take pictures here, which is what everything but `--images gl` uses."""
+    started = time.perf_counter()
+    try:
+        take_picture()
+    except Exception as error:  # whatever it is: a doctor names it and goes on
+        why = f"rays take no picture here ({type(error).__name__}: {error}); reinstall simbench"
+        return Finding(name="pictures", value=why, ok=False)
+    took_s = time.perf_counter() - started
+    return Finding(name="pictures", value=f"by rays, without OpenGL; took a small one in {took_s:.1f} s")
+
+
+def take_picture() -> None:
+    """Takes a small picture by rays of a board 7.5 m ahead. Raises RuntimeError unless it shows the board."""
+    from simbench.capture import set_in_motion  # here: where a package is missing, that is a finding
+    from simbench.case import Job
+    from simbench.sensors.camera import take
+    from simbench.stage import stage
+
+    staged = stage(Job(scenario="static-board", system="car", seed=0, pipelines=(), size_px=PICTURE_PX))
+    motion, name = set_in_motion(staged.world, staged.rig, staged.system.ego, None), "cam-front"
+    frame = take(motion, name, staged.rig.cameras[name], staged.rig.pinholes[name], 0, 0.0, None)
+    board = staged.world.find("board")
+    depth_m = frame.depth_m[frame.object_id == board.object_id]
+    if not len(depth_m) or abs(depth_m - BOARD_M).max() > 0.5 or frame.rgb.std() < 5:
+        raise RuntimeError("the picture does not show the board that stands before the camera")
+
+
+def _opengl() -> Iterable[Finding]:
+    only_for = "--images gl"
     try:
         found = gl.provision()
     except gl.RenderingUnavailable as error:
-        yield Finding(name="renderer", value=str(error), ok=False)
+        yield Finding(name="OpenGL", value=f"only for {only_for}: {error}", ok=False, only_for=only_for)
         return
-    yield Finding(name="renderer", value=f"{found.name}: {found.how}, found in {found.probe_s:.1f} s")
-    yield Finding(name="OpenGL", value=found.gl)
+    how = f"{found.name}: {found.how}, found in {found.probe_s:.1f} s; only for {only_for}"
+    yield Finding(name="OpenGL", value=how, only_for=only_for)
+    yield Finding(name="driver", value=found.gl, only_for=only_for)
     for sentence in found.passed_over:
-        yield Finding(name="passed over", value=sentence)
+        yield Finding(name="passed over", value=sentence, only_for=only_for)
 
 
 def _lock() -> Iterable[Finding]:
@@ -121,13 +165,17 @@ def _gb(count_b: float) -> str:
 
 
 def main() -> int:
-    """Prints the findings. 0: nothing is missing; 1: something is, and its line says what to do."""
+    """Prints the findings. 0: nothing is missing, or only what one choice needs; 1: something is, and its
+    line says what to do."""
+    print(WAIT, file=sys.stderr, flush=True)
     findings = report()
     width = max(len(finding.name) for finding in findings)
     for finding in findings:
-        print(f"{'ok     ' if finding.ok else 'missing'}  {finding.name:<{width}}  {finding.value}")
-    missing = [finding.name for finding in findings if not finding.ok]
-    print(f"\nmissing: {', '.join(missing)}" if missing else "\nnothing is missing")
+        print(f"{finding.state:<7}  {finding.name:<{width}}  {finding.value}")
+    missing = [finding.name for finding in findings if finding.state == "missing"]
+    absent = [f"{finding.name} for {finding.only_for}" for finding in findings if finding.state == "absent"]
+    but = f" but {', '.join(absent)}" if absent else ""
+    print(f"\nmissing: {', '.join(missing)}" if missing else f"\nnothing is missing{but}")
     return 1 if missing else 0
 
 

@@ -1,7 +1,7 @@
 """Which OpenGL draws the pictures: found once, proved by drawing in a child process, said aloud.
 
 `provision()` tries, in this order: what the user's MUJOCO_GL names (and nothing else, if it names one); EGL;
-the system's OSMesa; the Mesa inside the wheel `lavavu-osmesa`, which needs no root. Afterwards
+the system's OSMesa; the Mesa inside the wheel `lavavu-osmesa`, where that is installed. Afterwards
 `mujoco.Renderer` and `mujoco.GLContext` draw with the one found, whether MuJoCo was imported before or not.
 The choice goes to child processes by an environment variable: they do not probe again.
 
@@ -15,6 +15,7 @@ import ctypes
 import importlib
 import json
 import os
+import platform
 import subprocess
 import sys
 import textwrap
@@ -30,6 +31,7 @@ Name = Literal["egl", "osmesa", "osmesa-wheel", "glfw"]
 
 INHERITED = "SIMBENCH_GL"  # the parent's Renderer as JSON, and the MUJOCO_GL it was found under
 INSTALL = "apt-get install --no-install-recommends libegl1 libgl1"
+INSTALL_WHEEL = f"pip install --no-deps {WHEEL}"  # its requirements hold Jupyter, and drawing needs none
 PROBE_TIMEOUT_S = 60.0
 
 _IMPORT_ROOT = str(Path(__file__).parents[2])
@@ -127,9 +129,16 @@ def _find(request: str) -> Renderer:
         refused.append(f"{name}: {outcome.says}")
     wished = "" if request in _AUTOMATIC else f" with MUJOCO_GL={request}"
     raise RenderingUnavailable(
-        f"nothing here can render{wished} ({'; '.join(refused)}): install OpenGL as root with `{INSTALL}`, "
+        f"nothing here can render{wished} ({'; '.join(refused)}): install OpenGL {_remedies(request)}, "
         "or let rays take the pictures (--images raycast)."
     )
+
+
+def _remedies(request: str) -> str:
+    """How to install what this MUJOCO_GL can draw with."""
+    wheel_helps = "osmesa-wheel" in _BY_REQUEST[request] and platform.machine() == "x86_64"
+    without_root = f" or without root with `{INSTALL_WHEEL}`" if wheel_helps else ""
+    return f"as root with `{INSTALL}`{without_root}"
 
 
 # -- the probe ------------------------------------------------------------------------------------------

@@ -89,6 +89,38 @@ def test_what_cannot_be_had_is_said_in_one_sentence(
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("request_", "machine", "named"),
+    [
+        ("", "x86_64", True),
+        ("osmesa", "x86_64", True),
+        ("egl", "x86_64", False),
+        ("", "aarch64", False),
+    ],
+)
+def test_the_wheel_is_offered_where_it_exists_and_would_be_used(
+    monkeypatch: pytest.MonkeyPatch, request_: str, machine: str, named: bool
+) -> None:
+    monkeypatch.setattr(gl, "probe", working()[0])
+    monkeypatch.setattr(gl.platform, "machine", lambda: machine)
+    monkeypatch.setenv("MUJOCO_GL", request_)
+    with pytest.raises(gl.RenderingUnavailable) as caught:
+        gl.provision()
+    assert (gl.INSTALL_WHEEL in str(caught.value)) == named
+    assert gl.INSTALL in str(caught.value)
+
+
+def test_the_document_names_the_same_two_commands() -> None:
+    text = (Path(gl._IMPORT_ROOT) / "docs" / "install.md").read_text(encoding="utf-8")
+    assert f"`{gl.INSTALL}`" in text and f"`{gl.INSTALL_WHEEL}`" in text
+
+
+def test_a_missing_wheel_is_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(osmesa, "WHEEL", "no-such-wheel")
+    with pytest.raises(OSError, match="the Python package no-such-wheel is not installed"):
+        osmesa.load_wheel()
+
+
 def test_it_is_looked_for_once_per_process_and_not_again_in_children(monkeypatch: pytest.MonkeyPatch) -> None:
     probe, asked = working("osmesa")
     monkeypatch.setattr(gl, "probe", probe)
