@@ -206,11 +206,15 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
     from simbench.environment import environment
     from simbench.files import prepare_folder
     from simbench.report.page import write_report
+    from simbench.sensors import ray_kernel
+    from simbench.sensors.compiled import is_compiled
     from simbench.stage import stage
 
     first: dict[tuple[str, str, tuple[str, ...]], Job] = {}
     for job in planned:
         first.setdefault((job.scenario, job.system, job.faults), job)
+    if not is_compiled(ray_kernel._cast_fans):
+        click.echo("compiling the ray kernels, once: this takes up to a minute", err=True)
     for job in first.values():
         stage(job)  # bad input shows before anything runs
     prepare_folder(out)

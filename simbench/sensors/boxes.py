@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int, Int64
+from jaxtyping import Bool, Float64, Int
 
 from fusion.camera import PinholeCamera
 from fusion.geometry import Transform
 from fusion.messages import BoxPx
 from simbench.sensors import rays
+from simbench.sensors.lens import row_fans
 from simbench.sensors.outline import NEAR_M, outline_px
 from simbench.truth import TrueBox
 
-WHOLE_PX = 40_000  # outlines up to this area are looked at pixel by pixel
-COARSE_SAMPLES = 40  # samples along the longer side in the first look at larger ones
+Window = tuple[int, int, int, int]
+"""Pixels (x0, y0, x1, y1), x1 and y1 not in it."""
 
 
 class View:
-    """A frozen instant seen by one camera: casts pixel rays against all geoms or one object's.
+    """A frozen instant seen by one camera: casts the rays of pixels against all geoms or one object's.
 
     rotation, position: T_world_body of all bodies at the instant, [b 3 3] and [b 3].
     """
@@ -72,11 +73,9 @@ class View:
             return None
         return box
 
-    def cast(
-        self, us: Int64[np.ndarray, " c"], vs: Int64[np.ndarray, " r"], mask: Bool[np.ndarray, " g"]
-    ) -> Int[np.ndarray, "c r"]:
-        """Geom index (into the full table) at pixel columns us and rows vs, ascending; -1: nothing."""
-        camera, pose = self.camera, self.T_world_camera
+    def cast(self, window: Window, mask: Bool[np.ndarray, " g"]) -> Int[np.ndarray, "r c"]:
+        """Geom index (into the full table) at every pixel of a window, among those in `mask`; -1: nothing."""
+        pose = self.T_world_camera
         return rays.cast_window(
             self.placed,
             np.flatnonzero(mask),
@@ -84,77 +83,40 @@ class View:
             np.zeros(1),
             pose.rotation[None],
             pose.translation_m[None],
-            np.zeros(len(vs), dtype=np.int64),
-            (us + 0.5 - camera.cx_px) / camera.fx_px,
-            (vs + 0.5 - camera.cy_px) / camera.fy_px,
-        ).T
+            row_fans(self.camera),
+            np.zeros_like(row_fans(self.camera).pose),
+            window,
+        )
 
 
 def true_box(
     view: View, object_id: int, mask: Bool[np.ndarray, " g"], min_height_px: float
 ) -> TrueBox | None:
     """Amodal box (clipped to the image), visible box and visible fraction of one object; None when out of
-    view or its outline is lower than `min_height_px`.
-
-    The visible box is exact to the pixel: every pixel of the outline is looked at, or, of large ones, a grid
-    and every pixel between what it shows and the outline.
-    """
+    view or its outline is lower than `min_height_px`. The visible box is exact to the pixel."""
     outline = view.outline(mask)
     if outline is None or outline[3] - outline[1] < min_height_px:
         return None
     width, height = view.camera.width_px, view.camera.height_px
     x0, y0 = max(int(np.floor(outline[0])), 0), max(int(np.floor(outline[1])), 0)
     x1, y1 = min(int(np.ceil(outline[2])), width), min(int(np.ceil(outline[3])), height)
-    truncated = outline[0] < 0 or outline[1] < 0 or outline[2] > width or outline[3] > height
-    everything = np.ones_like(mask)
-    stride = 1
-    if (x1 - x0) * (y1 - y0) > WHOLE_PX:
-        stride = int(np.ceil(max(x1 - x0, y1 - y0) / COARSE_SAMPLES))
-    us, vs = np.arange(x0, x1, stride), np.arange(y0, y1, stride)
-    own = view.cast(us, vs, mask) >= 0
+    window = (x0, y0, x1, y1)
+    own = view.cast(window, mask) >= 0
     if not own.any():
-        us, vs = np.arange(x0, x1), np.arange(y0, y1)
-        own = view.cast(us, vs, mask) >= 0
-        if not own.any():
-            return None
-    seen = own & mask[view.cast(us, vs, everything)]
-    if truncated:
-        extent = _extent(view, mask, mask, own, us, vs, (x0, y0, x1, y1))
-        amodal: BoxPx = tuple(float(v) for v in extent)  # type: ignore[assignment]
-    else:
-        amodal = outline
-    visible: BoxPx | None = None
-    if seen.any():
-        found = _extent(view, mask, everything, seen, us, vs, (x0, y0, x1, y1))
-        visible = tuple(float(v) for v in found)  # type: ignore[assignment]
+        return None
+    seen = own & mask[view.cast(window, np.ones_like(mask))]
+    truncated = outline[0] < 0 or outline[1] < 0 or outline[2] > width or outline[3] > height
     return TrueBox(
         object_id=object_id,
-        amodal_px=amodal,
-        visible_px=visible,
-        visible_fraction=float(seen.sum() / own.sum()),
+        amodal_px=_extent(own, x0, y0) if truncated else outline,
+        visible_px=_extent(seen, x0, y0) if seen.any() else None,
+        visible_fraction=float(np.count_nonzero(seen) / np.count_nonzero(own)),
     )
 
 
-def _extent(
-    view: View, mask: np.ndarray, scene: np.ndarray, coarse: np.ndarray, us: np.ndarray, vs: np.ndarray,
-    limit: tuple[int, int, int, int],
-) -> tuple[int, int, int, int]:  # fmt: skip
-    """Pixel extent of the pixels whose nearest hit among `scene` is in `mask`: the coarse extent, and every
-    pixel of the four bands between it and the limit where the look was coarse."""
-    columns, rows = us[coarse.any(axis=1)], vs[coarse.any(axis=0)]
-    x0, x1, y0, y1 = int(columns[0]), int(columns[-1]) + 1, int(rows[0]), int(rows[-1]) + 1
-    lx0, ly0, lx1, ly1 = limit
-    if len(us) == lx1 - lx0 and len(vs) == ly1 - ly0:
-        return x0, y0, x1, y1
-    # The sides run over the full height.
-    for a, b, c, d in ((lx0, x0, ly0, ly1), (x1, lx1, ly0, ly1), (x0, x1, ly0, y0), (x0, x1, y1, ly1)):
-        if a >= b or c >= d:
-            continue
-        u, v = np.arange(a, b), np.arange(c, d)
-        geom = view.cast(u, v, scene)
-        found = (geom >= 0) & mask[geom]
-        if found.any():
-            columns, rows = u[found.any(axis=1)], v[found.any(axis=0)]
-            x0, x1 = min(x0, int(columns[0])), max(x1, int(columns[-1]) + 1)
-            y0, y1 = min(y0, int(rows[0])), max(y1, int(rows[-1]) + 1)
-    return x0, y0, x1, y1
+def _extent(shown: Bool[np.ndarray, "r c"], x0: int, y0: int) -> BoxPx:
+    """The extent of the pixels that show something, the first of which is (x0, y0)."""
+    columns, rows = np.flatnonzero(shown.any(axis=0)), np.flatnonzero(shown.any(axis=1))
+    return (
+        float(x0 + columns[0]), float(y0 + rows[0]), float(x0 + columns[-1] + 1), float(y0 + rows[-1] + 1)
+    )  # fmt: skip

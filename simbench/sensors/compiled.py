@@ -56,3 +56,10 @@ def jit_inline(function: Callable[..., Any]) -> Any:
     """Compile a helper of kernels into its callers."""
     compiled = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
     return compiled(inspect.unwrap(function))
+
+
+def is_compiled(kernel: Any) -> bool:
+    """Whether an earlier process has left the kernel compiled in the cache."""
+    function = kernel.py_func
+    name = f"{function.__module__.rsplit('.', 1)[-1]}.{function.__name__}-*.nbi"
+    return any(Path(kernel.stats.cache_path).glob(name))

@@ -34,11 +34,20 @@ def pixel_directions(camera: PinholeCamera) -> Float64[np.ndarray, "h w 3"]:
 
 
 @lru_cache(maxsize=8)
-def row_planes(
-    camera: PinholeCamera,
-) -> tuple[Float64[np.ndarray, "h 3 3"], Float64[np.ndarray, "h w"], Float64[np.ndarray, "h w"]]:
-    """The same directions row by row: frames (ahead, across, normal) and, in them, slopes that ascend with u
-    and skews (`rays.Fans`). Raises BadInput as `pixel_directions`."""
+def row_fans(camera: PinholeCamera) -> rays.Fans:
+    """The same directions as fans for `rays.cast_fans`: one per row, with a pose of its own, ascending in u.
+
+    Results lie row by row. Raises BadInput as `pixel_directions`.
+    """
+    rows = np.arange(camera.height_px)
+    if not any(camera.distortion):
+        x = (np.arange(camera.width_px) + 0.5 - camera.cx_px) / camera.fx_px
+        y = (rows + 0.5 - camera.cy_px) / camera.fy_px
+        scale, zero, one = 1.0 / np.sqrt(1.0 + y * y), np.zeros_like(y), np.ones_like(y)
+        ahead = np.stack([zero, y, one], axis=1) * scale[:, None]
+        normal = np.stack([zero, one, -y], axis=1) * scale[:, None]
+        frame = np.stack([ahead, np.stack([one, zero, zero], axis=1), normal], axis=2)
+        return rays.make_alike_fans(frame, x, scale, rows, rows * camera.width_px, 1)
     direction = pixel_directions(camera)
     # The plane of a row's ends (any plane near it will do: a bent row leaves it by its skew).
     across = direction[:, -1] - direction[:, 0]
@@ -49,15 +58,7 @@ def row_planes(
     frame = np.stack([ahead, across, np.cross(ahead, across)], axis=2)
     along = np.einsum("hij,hwi->hwj", frame, direction)
     slope = np.maximum.accumulate(along[..., 1] / along[..., 0], axis=1)
-    return readonly(frame), readonly(slope), readonly(along[..., 2] / along[..., 0])
-
-
-@lru_cache(maxsize=8)
-def row_fans(camera: PinholeCamera) -> rays.Fans:
-    """All rows as fans for `rays.cast_fans`, each with a pose of its own; results lie row by row."""
-    frame, slope, skew = row_planes(camera)
-    rows = np.arange(len(frame))
-    return rays.make_fans(frame, slope, skew, rows, rows * camera.width_px, 1)
+    return rays.make_fans(frame, slope, along[..., 2] / along[..., 0], rows, rows * camera.width_px, 1)
 
 
 def _check(slope: Float64[np.ndarray, "n 2"], camera: PinholeCamera) -> None:

@@ -18,6 +18,7 @@ from simbench.sensors.compiled import jit, jit_inline, jit_no_alias
 
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # as mujoco.mjtGeom
 LANES = 4  # fans that are cast together
+NOWHERE = -(2**62)  # where the rays of padding go
 RUN, RUN_CELLS = 64, 16  # pixels, and cells of the sun's grid, that are shaded together at most
 BLOCK, SUPERBLOCK = 16, 64  # fans whose geoms are culled together, before those of LANES fans are
 
@@ -619,11 +620,11 @@ def _fans_capsule(size, M, o, slope, skew, start, stop, i, best, who, facing):  
 
 
 @jit
-def _lane_from_inside(kind, size, M, o, slope, skew, lane, i, best, who, facing, work):  # type: ignore[no-untyped-def]
+def _lane_from_inside(kind, size, M, o, slope, skew, lane, begin, end, i, best, who, facing, work):  # type: ignore[no-untyped-def]
     """A sensor inside a geom sees its far side: one ray after the other."""
     for r in range(3):
         work[0, r] = o[r, lane]
-    for j in range(slope.shape[0]):
+    for j in range(begin, end):
         for r in range(3):
             work[1, r] = (
                 M[3 * r, lane] + slope[j, lane] * M[3 * r + 1, lane] + skew[j, lane] * M[3 * r + 2, lane]
@@ -682,9 +683,16 @@ def _frames_between(first, second, weight, G, C):  # type: ignore[no-untyped-def
 
 
 @jit_no_alias
-def _finish(slope, skew, best, facing):  # type: ignore[no-untyped-def]
+def _scaled(slope, scale, begin, end, out):  # type: ignore[no-untyped-def]
+    for j in range(begin, end):
+        for lane in range(LANES):
+            out[j, lane] = slope[j, lane] * scale[lane]
+
+
+@jit_no_alias
+def _finish(slope, skew, begin, end, best, facing):  # type: ignore[no-untyped-def]
     """From lengths along e + s u + x n to metres and cosines."""
-    for j in range(slope.shape[0]):
+    for j in range(begin, end):
         for lane in range(LANES):
             norm = np.sqrt(1.0 + slope[j, lane] * slope[j, lane] + skew[j, lane] * skew[j, lane])
             best[j, lane] *= norm
@@ -753,15 +761,57 @@ def _slopes_of(X, extent, stretch, skew, low, high):  # type: ignore[no-untyped-
         high[lane] = -np.inf if missed else highest
 
 
+@jit_inline
+def _steps_down(M, slope, skew, begin, end):  # type: ignore[no-untyped-def]
+    """Between which steps of four fans any ray may look down on a plane, whose axes M are given."""
+    first, last = end, begin
+    for lane in range(LANES):
+        a, b, off = M[6, lane], M[7, lane], skew * abs(M[8, lane]) + 1e-12
+        if a + slope[begin, lane] * b < off:
+            first = begin
+        if a + slope[end - 1, lane] * b < off:
+            last = end
+    if first == begin and last == end:
+        return begin, end
+    if first == begin:  # down at the start only: up to where the last lane levels out
+        while last < end:
+            down = False
+            for lane in range(LANES):
+                off = skew * abs(M[8, lane]) + 1e-12
+                down = down or M[6, lane] + slope[last, lane] * M[7, lane] < off
+            if not down:
+                break
+            last += 1
+    elif last == end:
+        while first > begin:
+            down = False
+            for lane in range(LANES):
+                off = skew * abs(M[8, lane]) + 1e-12
+                down = down or M[6, lane] + slope[first - 1, lane] * M[7, lane] < off
+            if not down:
+                break
+            first -= 1
+    return first, last
+
+
 @jit
 def _cast_fans(  # type: ignore[no-untyped-def]
     kind, size, bound, row, still, table, path, key, weight, R, origin, pose_of, frame, slope, skew,
-    first_step, last_step, low, bins_per_slope, slack, skew_max, out_at, out_stride, start, stop,
-    out_range, out_geom, out_cosine,
+    scale, first_step, last_step, low, bins_per_slope, slack, skew_max, out_at, out_stride, start, stop,
+    begin, end, out_range, out_geom, out_cosine,
 ):  # fmt: skip
-    """Fans [start, stop), four at a time; out_* are flat, ray j of fan f at out_at[f] + j * out_stride."""
-    geoms, steps, bins = kind.shape[0], slope.shape[1], first_step.shape[1]
-    high = low + (bins - 1) / bins_per_slope
+    """Rays [begin, end) of the fans [start, stop), four fans at a time; start and stop are multiples of four.
+
+    out_* are flat: ray j of fan f goes to out_at[f] + j * out_stride, that of padding (NOWHERE) is left out.
+    """
+    geoms, bins = kind.shape[0], first_step.shape[1]
+    alike = slope.shape[0] == 1  # all fans have the same slopes but for their scale
+    least, most = np.inf, -np.inf
+    for f in range(start, stop):
+        group, lane = 0 if alike else f // LANES, f % LANES
+        least = min(least, scale[f] * slope[group, begin, lane])
+        most = max(most, scale[f] * slope[group, end - 1, lane])
+    s, x, ones = np.empty((end, LANES)), np.zeros((end, LANES)), np.ones(LANES)
     W = np.empty((pose_of.shape[0], 9))
     near, close, here = np.empty(geoms, np.int64), np.empty(geoms, np.int64), np.empty(geoms, np.int64)
     everything, planes, count, flat = np.empty(geoms, np.int64), np.empty(geoms, np.int64), 0, 0
@@ -779,8 +829,8 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                 W[f, 3 * r + c] = (
                     R[p, r, 0] * frame[f, 0, c] + R[p, r, 1] * frame[f, 1, c] + R[p, r, 2] * frame[f, 2, c]
                 )
-    best, facing = np.empty((steps, LANES)), np.empty((steps, LANES))
-    who = np.empty((steps, LANES), np.int32)
+    best, facing = np.empty((end, LANES)), np.empty((end, LANES))
+    who = np.empty((end, LANES), np.int32)
     G, C, M, o, X = (
         np.empty((9, LANES)), np.empty((3, LANES)), np.empty((9, LANES)), np.empty((3, LANES)),
         np.empty((3, LANES)),
@@ -792,28 +842,32 @@ def _cast_fans(  # type: ignore[no-untyped-def]
         superstop = min(superblock + SUPERBLOCK, stop)
         many = _cull(
             superblock, superstop, kind, size, bound, row, still, table, path, key, weight, origin, pose_of,
-            W, low - slack, high + slack, skew_max + slack, everything, count, plane, near,
+            W, least - slack, most + slack, skew_max + slack, everything, count, plane, near,
         )  # fmt: skip
         for block in range(superblock, superstop, BLOCK):
             blockstop = min(block + BLOCK, superstop)
             some = _cull(
                 block, blockstop, kind, size, bound, row, still, table, path, key, weight, origin, pose_of, W,
-                low - slack, high + slack, skew_max + slack, near, many, plane, close,
+                least - slack, most + slack, skew_max + slack, near, many, plane, close,
             )  # fmt: skip
             for fan in range(block, blockstop, LANES):
                 group = fan // LANES
                 few = _cull(
                     fan, fan + LANES, kind, size, bound, row, still, table, path, key, weight, origin,
-                    pose_of, W, low - slack, high + slack, skew_max + slack, close, some, plane, here,
+                    pose_of, W, least - slack, most + slack, skew_max + slack, close, some, plane, here,
                 )  # fmt: skip
-                s, x = slope[group], skew[group]
+                table_of = 0 if alike else group
+                narrowest = min(scale[fan], scale[fan + 1], scale[fan + 2], scale[fan + 3])
+                widest = max(scale[fan], scale[fan + 1], scale[fan + 2], scale[fan + 3])
+                _scaled(slope[table_of], scale[fan : fan + LANES], begin, end, s)
+                _scaled(skew[table_of], ones, begin, end, x)
                 for lane in range(LANES):
                     key4[lane], weight4[lane] = key[pose_of[fan + lane]], weight[pose_of[fan + lane]]
                     for r in range(9):
                         W4[r, lane] = W[fan + lane, r]
                     for r in range(3):
                         P4[r, lane] = origin[pose_of[fan + lane], r]
-                for j in range(steps):
+                for j in range(begin, end):
                     for lane in range(LANES):
                         best[j, lane], who[j, lane], facing[j, lane] = np.inf, -1, 0.0
                 for m in range(flat):
@@ -823,7 +877,8 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     else:
                         _frames_of(row[i], table, key4, weight4, G, C)
                         _lanes(G, C, P4, W4, M, o, X)
-                    _fans_plane(size[i], M, o, s, x, 0, steps, i, best, who, facing)
+                    j0, j1 = _steps_down(M, s, skew_max + slack, begin, end)
+                    _fans_plane(size[i], M, o, s, x, j0, j1, i, best, who, facing)
                 for m in range(few):
                     i = here[m]
                     if row[i] < 0:
@@ -845,18 +900,21 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     top = max(highest[0], highest[1], highest[2], highest[3]) + slack
                     if bottom > top:
                         continue
+                    bottom, top = min(bottom / narrowest, bottom / widest), max(top / narrowest, top / widest)
                     b0 = (bottom - low) * bins_per_slope
                     b1 = (top - low) * bins_per_slope + 1.0
                     if b0 > bins - 1 or b1 < 0.0:
                         continue
-                    j0 = first_step[group, int(max(b0, 0.0))]
-                    j1 = last_step[group, int(min(b1, bins - 1.0))]
+                    j0 = max(first_step[table_of, int(max(b0, 0.0))], begin)
+                    j1 = min(last_step[table_of, int(min(b1, bins - 1.0))], end)
                     for lane in range(LANES):
                         x0, y0, z0 = o[0, lane], o[1, lane], o[2, lane]
                         if x0 * x0 + y0 * y0 + z0 * z0 > 1.01 * bound[i] * bound[i] + 1e-6:
                             continue
                         if _inside(kind[i], size[i], x0, y0, z0):
-                            _lane_from_inside(kind[i], size[i], M, o, s, x, lane, i, best, who, facing, work)
+                            _lane_from_inside(
+                                kind[i], size[i], M, o, s, x, lane, begin, end, i, best, who, facing, work
+                            )
                     if kind[i] == BOX:
                         _fans_box(size[i], M, o, s, x, j0, j1, i, best, who, facing)
                     elif kind[i] == CAPSULE:
@@ -871,64 +929,17 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         _fans_ellipsoid(
                             size[i, 0], size[i, 0], size[i, 0], M, o, s, x, j0, j1, i, best, who, facing
                         )
-                _finish(s, x, best, facing)
+                _finish(s, x, begin, end, best, facing)
                 for lane in range(LANES):
                     at = out_at[fan + lane]
-                    if at < 0:
+                    if at == NOWHERE:
                         continue
-                    for j in range(steps):
+                    at += begin * out_stride
+                    for j in range(begin, end):
                         out_range[at] = best[j, lane]
                         out_geom[at] = who[j, lane]
                         out_cosine[at] = facing[j, lane]
                         at += out_stride
-
-
-@jit
-def _cast_window(  # type: ignore[no-untyped-def]
-    kind, size, bound, row, still, table, path, key, weight, R, origin, pose_of, x, y, out_geom,
-):  # fmt: skip
-    """Pixels (x, y, 1) of the slopes x [c] ascending and y [r], every row with its own pose."""
-    rows, columns = y.shape[0], x.shape[0]
-    padded = rows + (-rows) % LANES
-    frame, pose = np.zeros((padded, 3, 3)), np.empty(padded, np.int64)
-    at = np.full(padded, -1, np.int64)
-    slopes = np.empty((padded, columns))
-    for f in range(padded):
-        r = min(f, rows - 1)
-        q = np.sqrt(1.0 + y[r] * y[r])
-        # Forward (0, y, 1) / q, right (1, 0, 0), and across both (0, 1, -y) / q.
-        frame[f, 1, 0], frame[f, 2, 0], frame[f, 0, 1] = y[r] / q, 1.0 / q, 1.0
-        frame[f, 1, 2], frame[f, 2, 2] = 1.0 / q, -y[r] / q
-        pose[f] = pose_of[r]
-        if f < rows:
-            at[f] = f * columns
-        for c in range(columns):
-            slopes[f, c] = x[c] / q
-    bins = columns + 1
-    low, high = np.inf, -np.inf
-    for f in range(rows):
-        low, high = min(low, slopes[f, 0]), max(high, slopes[f, columns - 1])
-    width = max((high - low) / (bins - 1), 1e-9)
-    first, last = np.empty((padded, bins), np.int32), np.empty((padded, bins), np.int32)
-    _bins(slopes, low, width, first, last)
-    groups = padded // LANES
-    slope, skew = np.empty((groups, columns, LANES)), np.zeros((groups, columns, LANES))
-    first_step, last_step = np.empty((groups, bins), np.int32), np.empty((groups, bins), np.int32)
-    for g in range(groups):
-        for c in range(columns):
-            for lane in range(LANES):
-                slope[g, c, lane] = slopes[g * LANES + lane, c]
-        for b in range(bins):
-            lowest, highest = first[g * LANES, b], last[g * LANES, b]
-            for lane in range(1, LANES):
-                lowest = min(lowest, first[g * LANES + lane, b])
-                highest = max(highest, last[g * LANES + lane, b])
-            first_step[g, b], last_step[g, b] = lowest, highest
-    range_m, cosine = np.empty(rows * columns), np.empty(rows * columns, np.float32)
-    _cast_fans(
-        kind, size, bound, row, still, table, path, key, weight, R, origin, pose, frame, slope, skew,
-        first_step, last_step, low, 1.0 / width, 0.0, 0.0, at, 1, 0, padded, range_m, out_geom, cosine,
-    )  # fmt: skip
 
 
 @jit
@@ -1062,8 +1073,8 @@ def _shade_by_tube(radius, half, ends, frame, d, point, shaded):  # type: ignore
 
 @jit
 def _sunlit(  # type: ignore[no-untyped-def]
-    kind, size, row, still, table, key, weight, R, origin, pose_of, frame, slope, skew, out_at, out_stride,
-    axes, footprint, low, cells_per_m, first, member, range_m, geom, lit,
+    kind, size, row, still, table, key, weight, R, origin, pose_of, frame, slope, skew, scale, out_at,
+    out_stride, axes, footprint, low, cells_per_m, first, member, range_m, geom, lit,
 ):  # fmt: skip
     """Whether the sun reaches what each ray hit. A geom, being convex, does not shade itself here: what of it
     faces the sun is lit unless another stands before it.
@@ -1080,7 +1091,7 @@ def _sunlit(  # type: ignore[no-untyped-def]
     run = 0
     for f in range(pose_of.shape[0]):
         at = out_at[f]
-        if at < 0:
+        if at == NOWHERE:
             continue
         p = pose_of[f]
         for r in range(3):
@@ -1088,9 +1099,9 @@ def _sunlit(  # type: ignore[no-untyped-def]
                 W[3 * r + c] = (
                     R[p, r, 0] * frame[f, 0, c] + R[p, r, 1] * frame[f, 1, c] + R[p, r, 2] * frame[f, 2, c]
                 )
-        group, lane = f // LANES, f % LANES
+        group, lane = 0 if slope.shape[0] == 1 else f // LANES, f % LANES
         for j in range(steps):
-            s_row[j], x_row[j] = slope[group, j, lane], skew[group, j, lane]
+            s_row[j], x_row[j] = scale[f] * slope[group, j, lane], skew[group, j, lane]
             r_row[j] = range_m[at + j * out_stride] if geom[at + j * out_stride] >= 0 else 0.0
             shaded[j] = False
         _run_points(W, origin[p], axes, s_row, x_row, r_row, point, across)

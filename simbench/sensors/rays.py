@@ -8,7 +8,7 @@ as `mj_ray` does, which is the oracle in the tests (ranges equal to 1e-9 m).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float32, Float64, Int, Int32, Int64
@@ -20,7 +20,7 @@ from simbench.sensors.ray_kernel import BOX as BOX
 from simbench.sensors.ray_kernel import CAPSULE as CAPSULE
 from simbench.sensors.ray_kernel import CYLINDER as CYLINDER
 from simbench.sensors.ray_kernel import ELLIPSOID as ELLIPSOID
-from simbench.sensors.ray_kernel import LANES
+from simbench.sensors.ray_kernel import LANES, NOWHERE
 from simbench.sensors.ray_kernel import PLANE as PLANE
 from simbench.sensors.ray_kernel import SPHERE as SPHERE
 
@@ -176,31 +176,14 @@ def place(
     return Placed(geoms=geoms, still=still[0], row=row, keys=keys, path_m=path_m)
 
 
-def some(placed: Placed, wanted: Int[np.ndarray, " n"]) -> Placed:
-    """Only the geoms `wanted`, numbered anew."""
-    geoms = placed.geoms
-    return replace(
-        placed,
-        geoms=Geoms(
-            kind=geoms.kind[wanted],
-            size_m=geoms.size_m[wanted],
-            body=geoms.body[wanted],
-            rotation=geoms.rotation[wanted],
-            position_m=geoms.position_m[wanted],
-            bound_m=geoms.bound_m[wanted],
-        ),
-        still=placed.still[wanted],
-        row=placed.row[wanted],
-    )
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fans:
     """Directions of a sensor as fans: ray j of fan f looks along e + slope u + skew n, frame = (e, u, n).
 
     frame [f 3 3]: R_sensor_fan, columns e, u, n. slope, skew [f/4 k 4]: of four fans side by side (`packed`);
-    slopes ascend along k. pose [f]: index of each fan's pose. out_at [f], out_stride: where its rays go in
-    the flat result, -1 for padding. low, bins_per_slope, first_step, last_step [f/4 n]: from a slope to the
+    slopes ascend along k. Fans that are alike have one row (g = 1) for all, no skew, and slopes times their
+    scale [f], which is 1 elsewhere. pose [f]: index of each fan's pose. out_at [f], out_stride: where its
+    rays go in the flat result. low, bins_per_slope, first_step, last_step [f/4 n]: from a slope to the
     first and last steps that reach it. slack: by how much slopes and skews given to `cast_fans` may differ
     from these.
     """
@@ -208,6 +191,7 @@ class Fans:
     frame: Float64[np.ndarray, "f 3 3"]
     slope: Float64[np.ndarray, "g k l"]
     skew: Float64[np.ndarray, "g k l"]
+    scale: Float64[np.ndarray, " f"]
     pose: Int64[np.ndarray, " f"]
     out_at: Int64[np.ndarray, " f"]
     out_stride: int
@@ -236,11 +220,30 @@ def make_fans(
     slack: float = 0.0,
 ) -> Fans:
     """Tabulate fans. ValueError: slopes that do not ascend, or that are not finite."""
+    return _tabulated(frame, slope, skew, np.ones(len(frame)), pose, out_at, out_stride, slack)
+
+
+def make_alike_fans(
+    frame: Float64[np.ndarray, "f 3 3"],
+    slope: Float64[np.ndarray, " k"],
+    scale: Float64[np.ndarray, " f"],
+    pose: Int64[np.ndarray, " f"],
+    out_at: Int64[np.ndarray, " f"],
+    out_stride: int,
+) -> Fans:
+    """The same for flat fans whose slopes differ by a scale only: small tables, which stay in the cache."""
+    return _tabulated(frame, slope[None], np.zeros((1, len(slope))), scale, pose, out_at, out_stride, 0.0)
+
+
+def _tabulated(
+    frame: np.ndarray, slope: np.ndarray, skew: np.ndarray, scale: np.ndarray, pose: np.ndarray,
+    out_at: np.ndarray, out_stride: int, slack: float,
+) -> Fans:  # fmt: skip
     if not (np.isfinite(slope).all() and np.isfinite(skew).all()):
         raise ValueError("slopes and skews must be finite: a fan spans less than half a turn")
     if (np.diff(slope, axis=1) < 0.0).any():
         raise ValueError("the slopes of a fan must ascend")
-    padding = -len(slope) % LANES
+    padding = -len(frame) % LANES
     low, high = float(slope.min()), float(slope.max())
     bins = BINS_PER_STEP * slope.shape[1] + 1
     width = max((high - low) / (bins - 1), 1e-9)
@@ -249,14 +252,15 @@ def make_fans(
     kernel._bins(np.ascontiguousarray(slope), low, width, first, last)
 
     def padded(values: np.ndarray) -> np.ndarray:
-        return np.concatenate([values, np.repeat(values[-1:], padding, axis=0)])
+        return np.concatenate([values, np.repeat(values[-1:], -len(values) % LANES, axis=0)])
 
     return Fans(
         frame=readonly(padded(frame)),
         slope=readonly(packed(slope)),
         skew=readonly(packed(skew)),
+        scale=readonly(padded(scale)),
         pose=readonly(padded(pose)),
-        out_at=readonly(np.concatenate([out_at, np.full(padding, -1)])),
+        out_at=readonly(np.concatenate([out_at, np.full(padding, NOWHERE)])),
         out_stride=out_stride,
         low=low,
         bins_per_slope=1.0 / width,
@@ -300,6 +304,7 @@ def cast_fans(
         fans.frame,
         fans.slope if slope is None else slope,
         fans.skew if skew is None else skew,
+        fans.scale,
         fans.first_step,
         fans.last_step,
         fans.low,
@@ -310,6 +315,8 @@ def cast_fans(
         fans.out_stride,
         0,
         len(fans.pose),
+        0,
+        fans.slope.shape[1],
         out.range_m.reshape(-1),
         out.geom.reshape(-1),
         out.cosine.reshape(-1),
@@ -321,26 +328,32 @@ def cast_window(
     wanted: Int[np.ndarray, " n"],
     key: Int64[np.ndarray, " p"],
     weight: Float64[np.ndarray, " p"],
-    R_world_camera: Float64[np.ndarray, "p 3 3"],
+    R_world_sensor: Float64[np.ndarray, "p 3 3"],
     origin_m: Float64[np.ndarray, "p 3"],
-    pose: Int64[np.ndarray, " r"],
-    x: Float64[np.ndarray, " c"],
-    y: Float64[np.ndarray, " r"],
+    fans: Fans,
+    pose: Int64[np.ndarray, " f"],
+    window: tuple[int, int, int, int],
 ) -> Int32[np.ndarray, "r c"]:
-    """The geom that each pixel ray (x, y, 1) of a camera meets first, among the geoms `wanted`; -1: none.
+    """The geom that rays of a part of the fans meet first, among the geoms `wanted`; -1: none.
 
-    x ascends; row i of y has pose `pose[i]`; poses as for `cast_fans`.
+    window: (first ray, first fan, last ray, last fan), the last ones not in it. pose: of each fan, in place
+    of `fans.pose`; the rest as for `cast_fans`.
     """
-    geoms = placed.geoms
-    found = np.empty((len(y), len(x)), dtype=np.int32)
-    kernel._cast_window(
+    geoms, (begin, top, end, bottom) = placed.geoms, window
+    start, stop = top - top % LANES, min(bottom + (-bottom) % LANES, len(fans.pose))
+    width = end - begin
+    found = np.empty((stop - start, width), dtype=np.int32)
+    range_m, cosine = np.empty(found.size), np.empty(found.size, dtype=np.float32)
+    out_at = width * (np.arange(len(fans.pose)) - start) - begin
+    kernel._cast_fans(
         geoms.kind[wanted], geoms.size_m[wanted], geoms.bound_m[wanted], placed.row[wanted],
         placed.still[wanted], placed.keys, placed.path_m, key, weight,
-        np.ascontiguousarray(R_world_camera), np.ascontiguousarray(origin_m), pose,
-        np.ascontiguousarray(x), np.ascontiguousarray(y), found.reshape(-1),
+        np.ascontiguousarray(R_world_sensor), np.ascontiguousarray(origin_m), pose, fans.frame, fans.slope,
+        fans.skew, fans.scale, fans.first_step, fans.last_step, fans.low, fans.bins_per_slope, fans.slack,
+        fans.skew_max, out_at, 1, start, stop, begin, end, range_m, found.reshape(-1), cosine,
     )  # fmt: skip
     named = np.append(wanted, -1).astype(np.int32)
-    return named[found]
+    return named[found[top - start : bottom - start]]
 
 
 def empty_hits(shape: tuple[int, ...]) -> Hits:
@@ -393,7 +406,7 @@ def sunlit(
         np.ascontiguousarray(key, dtype=np.int64), np.ascontiguousarray(weight, dtype=np.float64),
         np.ascontiguousarray(R_world_sensor, dtype=np.float64),
         np.ascontiguousarray(origin_m, dtype=np.float64),
-        fans.pose, fans.frame, fans.slope, fans.skew, fans.out_at, fans.out_stride,
+        fans.pose, fans.frame, fans.slope, fans.skew, fans.scale, fans.out_at, fans.out_stride,
         axes, footprint, low, cells_per_m, first, member,
         hits.range_m.reshape(-1), hits.geom.reshape(-1), lit.reshape(-1),
     )  # fmt: skip

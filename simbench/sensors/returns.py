@@ -19,6 +19,7 @@ from simbench.sensors.compiled import jit
 
 SOFT_EDGE = 0.04  # relative width of the logistic fall of detection probability at R(rho) [judgement]
 MAX_FALSE_RANGE_M = 100.0
+LOG_SURE = np.log(1.0 - 17.0 * SOFT_EDGE)  # nearer, the chance of a miss is under that of the smallest draw
 FALSE_INTENSITY = 0.02  # a false return is as weak as what the sensor just detects [judgement]
 
 
@@ -138,7 +139,7 @@ def deliver(
     n = table.fire_offset_ns.size
     column, beam, part = np.empty(n, np.int32), np.empty(n, np.int16), np.empty(n, np.int32)
     xyz, intensity = np.empty((n, 3), np.float32), np.empty(n, np.float32)
-    true_range, incidence = np.empty(n), np.empty(n, np.float32)
+    true_range, upright = np.empty(n), np.empty(n, np.float32)
     strengths, sd = _noise_levels(sensor)
     off = sensor.off
     count = _deliver(
@@ -150,7 +151,7 @@ def deliver(
         0.0 if "resolution" in off else sensor.resolution_m, sensor.min_range_m,
         0.0 if "dropout" in off else sensor.dropout_rate,
         0.0 if "false_positives" in off else sensor.false_positive_rate,
-        column, beam, part, xyz, intensity, true_range, incidence,
+        column, beam, part, xyz, intensity, true_range, upright,
     )  # fmt: skip
     return Points(
         column=column[:count],
@@ -159,7 +160,7 @@ def deliver(
         intensity=intensity[:count],
         part=part[:count],
         true_range_m=true_range[:count],
-        incidence_rad=incidence[:count],
+        incidence_rad=np.arccos(np.clip(upright[:count], 0.0, 1.0)),
     )
 
 
@@ -188,7 +189,7 @@ def _deliver(  # type: ignore[no-untyped-def]
     range_m, true_m, geom, cosine, reflectivity, direction, order, instant, place, instants,
     range_noise, detection, false_return, false_range, dropout,
     law, log_reach_at_10, exponent, strengths, sd, resolution, min_range, dropout_rate, false_rate,
-    out_column, out_beam, out_part, out_xyz, out_intensity, out_true, out_incidence,
+    out_column, out_beam, out_part, out_xyz, out_intensity, out_true, out_cosine,
 ):  # fmt: skip
     """One pass over the beams in firing order; the number of points."""
     n = 0
@@ -197,14 +198,15 @@ def _deliver(  # type: ignore[no-untyped-def]
             b = order[j]
             g, k = c * instants + instant[b], place[b]
             part, measured, bright, true = -1, 0.0, FALSE_INTENSITY, 0.0
-            angle = 0.5 * np.pi
+            upright = np.float32(0.0)
             if geom[g, k] >= 0 and not dropout[c, b] < dropout_rate:
                 distance, back = range_m[g, k], reflectivity[g, k]
                 log_reach = log_reach_at_10 + exponent * np.log(max(back, 1e-6) / 0.1)
                 seen = True
                 if law:
-                    excess = (distance * np.exp(-log_reach) - 1.0) / SOFT_EDGE
-                    if excess > -17.0:  # below, the chance of a miss is under that of the smallest draw
+                    log_share = np.log(max(distance, 0.1)) - log_reach
+                    if log_share > LOG_SURE:
+                        excess = (np.exp(log_share) - 1.0) / SOFT_EDGE
                         seen = detection[c, b] < 1.0 / (1.0 + np.exp(min(excess, 60.0)))
                 if seen:
                     level = 2.0 * (log_reach - np.log(max(distance, 0.1)))
@@ -223,7 +225,7 @@ def _deliver(  # type: ignore[no-untyped-def]
                         measured = np.rint(measured / resolution) * resolution
                     part, true = geom[g, k], true_m[g, k]
                     bright = min(max(back, 0.0), 1.0)
-                    angle = np.arccos(min(max(float(cosine[g, k]), 0.0), 1.0))
+                    upright = cosine[g, k]
             if part < 0:
                 if not false_return[c, b] < false_rate:
                     continue
@@ -234,6 +236,6 @@ def _deliver(  # type: ignore[no-untyped-def]
             out_column[n], out_beam[n], out_part[n] = c, b, part
             for i in range(3):
                 out_xyz[n, i] = measured * direction[c, b, i]
-            out_intensity[n], out_true[n], out_incidence[n] = bright, true, angle
+            out_intensity[n], out_true[n], out_cosine[n] = bright, true, upright
             n += 1
     return n

@@ -17,8 +17,8 @@ from fusion.geometry import Transform
 from fusion.messages import BoxPx
 from simbench.motion import Motion, at
 from simbench.sensors import rays
-from simbench.sensors.boxes import View
-from simbench.sensors.lens import pixel_directions, row_planes
+from simbench.sensors.boxes import View, Window
+from simbench.sensors.lens import pixel_directions, row_fans
 from simbench.sensors.outline import NEAR_M
 from simbench.sensors.rows import Exposure, exposure_at, row_times_ns
 
@@ -143,25 +143,13 @@ class RowView(View):
         flat = np.concatenate([slope, np.ones((*slope.shape[:2], 1))], axis=-1).reshape(-1, 3)
         return self.camera.project(flat).reshape(slope.shape)
 
-    def cast(
-        self, us: Int64[np.ndarray, " c"], vs: Int64[np.ndarray, " r"], mask: Bool[np.ndarray, " g"]
-    ) -> Int[np.ndarray, "c r"]:
+    def cast(self, window: Window, mask: Bool[np.ndarray, " g"]) -> Int[np.ndarray, "r c"]:
         """As `View.cast`, each row at its own time."""
-        seen, camera, wanted = self.exposure, self.camera, np.flatnonzero(mask)
-        if not self._bent:
-            return rays.cast_window(
-                seen.placed, wanted, seen.key, seen.weight, seen.R_world_camera, seen.origin_m, vs,
-                (us + 0.5 - camera.cx_px) / camera.fx_px, (vs + 0.5 - camera.cy_px) / camera.fy_px,
-            ).T  # fmt: skip
-        frame, slope, skew = row_planes(camera)
-        fans = rays.make_fans(
-            frame[vs], slope[vs][:, us], skew[vs][:, us], vs, np.arange(len(vs)) * len(us), 1
+        seen, fans = self.exposure, row_fans(self.camera)
+        return rays.cast_window(
+            seen.placed, np.flatnonzero(mask), seen.key, seen.weight, seen.R_world_camera, seen.origin_m,
+            fans, fans.pose, window,
         )  # fmt: skip
-        hits = rays.empty_hits((len(vs), len(us)))
-        some = rays.some(seen.placed, wanted)
-        rays.cast_fans(some, seen.key, seen.weight, seen.R_world_camera, seen.origin_m, fans, hits)
-        named: np.ndarray = np.append(wanted, -1)[hits.geom].T
-        return named
 
 
 @lru_cache(maxsize=8)

@@ -76,6 +76,7 @@ class Shot:
             frame=frame,
             slope=np.repeat(one.slope, blocks, axis=0),
             skew=np.repeat(one.skew, blocks, axis=0),
+            scale=np.ones(len(order)),
             pose=group[order],
             out_at=order * samples,
             first_step=np.repeat(one.first_step, blocks, axis=0),

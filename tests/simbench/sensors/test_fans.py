@@ -207,7 +207,8 @@ def test_parts_of_a_sweep_are_the_sweep_bit_by_bit() -> None:
         frame, packs = look.fans.frame[some], slice(start // 4, start // 4 + 16)
         fans = replace(
             look.fans, frame=frame, slope=look.fans.slope[packs], skew=look.fans.skew[packs],
-            pose=look.fans.pose[some], out_at=look.fans.out_at[some] - 20 * start,
+            scale=look.fans.scale[some], pose=look.fans.pose[some],
+            out_at=look.fans.out_at[some] - 20 * start,
             first_step=look.fans.first_step[packs], last_step=look.fans.last_step[packs],
         )  # fmt: skip
         n = len(look.origin)

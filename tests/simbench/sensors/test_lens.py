@@ -91,7 +91,9 @@ def test_the_fans_of_the_rows_look_along_the_same_directions(distortion: Distort
     lens = camera(distortion)
     direction, fans = pixel_directions(lens), row_fans(lens)
     for row in range(60):
-        slope, skew = fans.slope[row // LANES, :, row % LANES], fans.skew[row // LANES, :, row % LANES]
+        pack = 0 if len(fans.slope) == 1 else row // LANES
+        slope = fans.scale[row] * fans.slope[pack, :, row % LANES]
+        skew = fans.skew[pack, :, row % LANES]
         ahead, across, aside = fans.frame[row].T
         found = ahead + slope[:, None] * across + skew[:, None] * aside
         found /= np.linalg.norm(found, axis=1)[:, None]
