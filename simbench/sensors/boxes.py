@@ -13,6 +13,7 @@ from simbench.sensors.lens import row_fans
 from simbench.sensors.outline import NEAR_M, outline_px
 from simbench.truth import TrueBox
 
+MOVED_M = 1.0  # more than anything moves while an image is read out
 Window = tuple[int, int, int, int]
 """Pixels (x0, y0, x1, y1), x1 and y1 not in it."""
 
@@ -101,10 +102,11 @@ def true_box(
     x0, y0 = max(int(np.floor(outline[0])), 0), max(int(np.floor(outline[1])), 0)
     x1, y1 = min(int(np.ceil(outline[2])), width), min(int(np.ceil(outline[3])), height)
     window = (x0, y0, x1, y1)
-    own = view.cast(window, mask) >= 0
+    first = view.cast(window, np.ones_like(mask))
+    seen = (first >= 0) & mask[first]
+    own = view.cast(window, mask) >= 0 if not seen.any() or may_hide(view, first, mask) else seen
     if not own.any():
         return None
-    seen = own & mask[view.cast(window, np.ones_like(mask))]
     truncated = outline[0] < 0 or outline[1] < 0 or outline[2] > width or outline[3] > height
     return TrueBox(
         object_id=object_id,
@@ -112,6 +114,16 @@ def true_box(
         visible_px=_extent(seen, x0, y0) if seen.any() else None,
         visible_fraction=float(np.count_nonzero(seen) / np.count_nonzero(own)),
     )
+
+
+def may_hide(view: View, first: Int[np.ndarray, "r c"], mask: Bool[np.ndarray, " g"]) -> bool:
+    """Whether one of the geoms that are seen may stand before one of those in `mask`, by their distances."""
+    distance_m, bound_m = np.linalg.norm(view.centre_camera_m, axis=1), view.geoms.bound_m
+    shown = np.zeros(len(mask) + 1, dtype=np.bool_)
+    shown[first] = True  # the last for -1, nothing
+    farthest_m = (distance_m + bound_m)[mask].max() + MOVED_M
+    other = shown[:-1] & ~mask & np.isfinite(bound_m)  # the ground hides nothing that stands on it
+    return bool((distance_m[other] - bound_m[other] < farthest_m).any())
 
 
 def _extent(shown: Bool[np.ndarray, "r c"], x0: int, y0: int) -> BoxPx:

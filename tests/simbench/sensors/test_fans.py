@@ -161,6 +161,29 @@ def test_no_culling_loses_a_hit(kinds: list[int], seed: int, wide: float, skewed
     assert_same(look.cast(), plain(look))
 
 
+@pytest.mark.parametrize("kind", KINDS, ids=NAMES.get)
+def test_of_a_small_far_shape_no_ray_at_its_rim_is_lost(kind: int) -> None:
+    """Half a metre at 50 m under 4,001 rays: the interval of slopes is as narrow as the shape."""
+    size = np.array([0.5, 0.01 if kind == rays.CAPSULE else 0.5, 0.5])
+    geoms = rays.Geoms(
+        kind=np.array([kind]), size_m=size[None], body=np.zeros(1, np.int32), rotation=np.eye(3)[None],
+        position_m=np.array([[50.0, 0.0, 0.0]]), bound_m=np.array([0.9]),
+    )  # fmt: skip
+    slope = np.linspace(-0.02, 0.02, 4001)
+    for across, up in (((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0))):
+        frame = np.array([[1.0, 0.0, 0.0], across, up]).T[None]
+        zero = np.zeros(1, np.int64)
+        fans = rays.make_fans(frame, slope[None], np.zeros((1, 4001)), zero, zero, 1)
+        hits = rays.empty_hits((1, 4001))
+        at_rest = np.eye(3)[None], np.zeros((1, 3))
+        placed = rays.place(geoms, at_rest[0][None], at_rest[1][None])
+        rays.cast_fans(placed, zero, np.zeros(1), *at_rest, fans, hits)
+        direction = frame[0, :, 0] + slope[:, None] * frame[0, :, 1]
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        slow = rays.cast(geoms, at_rest[0][None], at_rest[1][None], zero, at_rest[1], direction[None])
+        assert assert_same(hits, slow) > 1500
+
+
 @settings(max_examples=30)
 @given(kinds=shapes, seed=st.integers(0, 2**32 - 1))
 def test_directions_may_leave_the_table_by_its_slack(kinds: list[int], seed: int) -> None:
