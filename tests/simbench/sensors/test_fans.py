@@ -311,3 +311,21 @@ def test_the_shadow_of_a_ball_is_where_geometry_says() -> None:
     lit = rays.sunlit(placed, *at, fans, hits, np.array([0.0, 0.0, 1.0]))
     x = slope[0] * 1.9
     assert np.array_equal(lit[0], np.abs(x) > 1.0)
+
+
+def test_the_shadow_of_a_board_is_as_long_as_the_board_is_high_when_the_sun_stands_at_45_degrees() -> None:
+    """A board 0.2 m high ends at x = 0; seen from above, the ground beside it is dark up to x = 0.2."""
+    geoms = rays.Geoms(
+        kind=np.array([rays.PLANE, rays.BOX]), size_m=np.array([[0.0, 0.0, 1.0], [0.01, 3.0, 0.1]]),
+        body=np.zeros(2, np.int32), rotation=np.broadcast_to(np.eye(3), (2, 3, 3)),
+        position_m=np.array([[0.0, 0.0, 0.0], [-0.01, 0.0, 0.1]]), bound_m=np.array([np.inf, 3.05]),
+    )  # fmt: skip
+    frame = np.array([[[0.0, 1.0, 0.0], [0.0, 0.0, -1.0], [-1.0, 0.0, 0.0]]])  # e = -z, u = x, n = -y
+    slope = np.linspace(0.0005, 0.4, 400)[None]
+    fans = rays.make_fans(frame, slope, np.zeros((1, 400)), np.zeros(1, np.int64), np.zeros(1, np.int64), 1)
+    at = (np.zeros(1, np.int64), np.zeros(1), np.eye(3)[None], np.array([[0.0, 0.0, 2.0]]))
+    placed, hits = rays.place(geoms, np.eye(3)[None, None], np.zeros((1, 1, 3))), rays.empty_hits((1, 400))
+    rays.cast_fans(placed, *at, fans, hits)
+    assert (hits.geom == 0).all()
+    lit = rays.sunlit(placed, *at, fans, hits, np.array([-1.0, 0.0, 1.0]) / np.sqrt(2.0))
+    assert np.array_equal(lit[0], 2.0 * slope[0] > 0.2)
