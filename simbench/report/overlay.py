@@ -68,7 +68,7 @@ def marks_of(view: PairView, pipeline: str | None, camera: PinholeCamera) -> Mar
 def common_field(marks: list[Marks], camera: PinholeCamera, aspect: float = WIDTH / HEIGHT) -> BoxPx:
     """The part of the image that shows every given target with its AOI and arrow; aspect: width : height.
 
-    It is moved into the image; where it is larger than the image, it is centred on it."""
+    It is moved into the image, and never larger than it takes to show all of it."""
     boxes = [m.aoi or m.outline for m in marks] + [m.outline for m in marks]
     dots = [p for m in marks for p in (m.true_px, m.told_px) if np.isfinite(p).all()]
     x0 = min([b[0] for b in boxes] + [p[0] for p in dots])
@@ -76,7 +76,8 @@ def common_field(marks: list[Marks], camera: PinholeCamera, aspect: float = WIDT
     x1 = max([b[2] for b in boxes] + [p[0] for p in dots])
     y1 = max([b[3] for b in boxes] + [p[1] for p in dots])
     width, height = (1.0 + 2.0 * MARGIN) * (x1 - x0), (1.0 + 2.0 * MARGIN) * (y1 - y0)
-    width, height = max(width, height * aspect), max(height, width / aspect)
+    width = min(max(width, height * aspect), max(camera.width_px, camera.height_px * aspect))
+    height = width / aspect
     x = within(0.5 * (x0 + x1), 0.5 * width, float(camera.width_px))
     y = within(0.5 * (y0 + y1), 0.5 * height, float(camera.height_px))
     return (x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)

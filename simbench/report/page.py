@@ -37,6 +37,7 @@ from simbench.report.words import (
     points,
     runs_words,
     sentence,
+    stamp_words,
 )
 from simbench.score.statistics import MIN_RUNS
 
@@ -46,14 +47,21 @@ CROP_PX = 800  # width of a crop's picture
 NOT_SHOWN = (
     "Boxes come from a simulated detector (edge errors, misses in bursts, false boxes), not from a network.",
     "Bodies are rigid primitives with one reflectivity a material; glass is opaque; no loose clothes.",
-    "No rain, fog, dust, sun glare, multi-path or cross-talk between LiDARs; the ground is flat.",
+    "No rain, fog, dust, sun glare, mirrors, retroreflectors, multi-path or cross-talk between LiDARs; the "
+    "visible ground is flat.",
     "Vibration is scripted noise of the stated level; motion.road integrates a vehicle, on a drawn road.",
-    "Cameras are pinholes with a global shutter; exposure blur and lens residuals are not drawn.",
+    "Cameras have hard shadows, no vignetting, lens flare, Bayer pattern or automatic exposure.",
     "The paper published no data: its values stand beside ours for orientation. That its scenario 1 is the "
     "approach and its scenario 2 the receding half is assumed.",
     "The paper's TPR asks for distance only, and a thin slice of an object scores above all of its points: "
     "the oracle is a ceiling for recall, not for TPR.",
 )
+
+STILLS: Mapping[Images, str] = {
+    "none": "",
+    "raycast": "Pictures are finer than the camera's, in colour, without noise, blur, JPEG.",
+    "gl": "Pictures are finer than the camera's, in colour, all rows at one instant.",
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +105,7 @@ class Section:
     group: Group
     faults: str
     shake: str
+    stamps: str
     median: Shot | None
     worst: Shot | None
     panels: tuple[Panel, ...]
@@ -143,6 +152,7 @@ def write_report(
         seeds=", ".join(str(s) for s in sorted({r.job.seed for r in results})),
         command=command,
         images=images,
+        stills=STILLS[images],
         c=palette,
     )
     path = out / "report.html"
@@ -198,7 +208,7 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
     chosen = median_and_worst(group)
     sample = group.results(group.main_side)[0][1]
     median = worst = modes = shapes = over_frames = None
-    explained, seed = "", None
+    explained, stamps, seed = "", "", None
     panels: tuple[Panel, ...] = ()
     if chosen is not None:
         run = chosen[0].run
@@ -210,6 +220,7 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
         over_frames = figures.tpr_over_frames(group, run)
         try:
             replays = _Replays(group, chosen, images)
+            stamps = stamp_words(tuple(replays.of(shown).staged.rig.cameras.values()))
             median = _shot(group, chosen[0], "median", replays)
             worst = _shot(group, chosen[1], "largest", replays)
             modes, shapes, explained = _explained(group, chosen[0], replays)
@@ -221,6 +232,7 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
         group=group,
         faults=fault_words(sample.faults) if len(sample.faults) else "no injected errors",
         shake=sample.shake,
+        stamps=stamps,
         median=median,
         worst=worst,
         panels=panels,

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from scenarios.fault_set import FaultSet
 from scenarios.faults import RoadShake
+from scenarios.scenario import CameraSensor, ends
 from simbench.case import ORACLE
 from simbench.report.choose import Group, mean_of_runs
 from simbench.score.statistics import MIN_RUNS
@@ -122,14 +123,20 @@ def _compared(groups: Sequence[Group]) -> str:
     kinds = {fault_words(group.results("faulted")[0][1].faults) for group in groups}
     cause = kinds.pop() if len(kinds) == 1 else "the injected errors"
     cause = cause[0].upper() + cause[1:]
-    costs, gains = [], []
+    costs: list[str] = []
+    gains: list[str] = []
+    said = ""
     for group in groups:
         a = mean_of_runs(group, "clean", group.baseline, "tpr")
         b = mean_of_runs(group, "faulted", group.baseline, "tpr")
+        verb, amount = _effect(a, b)
+        whom = "it" if costs else f"the {pipeline_words(group.baseline)}"
+        scores = "no score" if a is None or b is None else f"{percent(a)} → {percent(b)} %"
+        start = "" if verb == said else f"{verb} {whom} "
+        costs.append(f"{start}{amount} {_on(group, groups)} ({scores})")
+        said = verb
         if a is None or b is None:
-            costs.append(f"an unknown amount {_on(group, groups)} (no score)")
             continue
-        costs.append(f"{_cost(a - b)} {_on(group, groups)} ({percent(a)} → {percent(b)} %)")
         c = mean_of_runs(group, "faulted", group.method, "tpr")
         if c is None:
             continue
@@ -139,17 +146,32 @@ def _compared(groups: Sequence[Group]) -> str:
         extra = "" if without is None else f"; {percent(without)} % without the errors"
         extra += "; no position" if y is None else f"; position error {metres(x)} → {metres(y)} m"
         gains.append(f"{percent(c)} % {_on(group, groups)} ({points(c - b)}{extra})")
-    text = f"{cause} cost the {pipeline_words(groups[0].baseline)} {joined(costs)}"
+    text = f"{cause} {joined(costs)}"
     method = groups[0].method
     if gains and method is not None:
         text += f"; with the {pipeline_words(method)} the TPR is {joined(gains)}"
     return text
 
 
-def _cost(loss: float) -> str:
-    """'1.3 points of TPR'; a gain has a minus."""
-    value = _unsigned_zero(100.0 * loss, 1)
-    return f"{value:.1f} points of TPR".replace("-", "−")
+def _effect(without: float | None, with_errors: float | None) -> tuple[str, str]:
+    """'cost' or 'gave', and how much: '1.3 points of TPR'."""
+    if without is None or with_errors is None:
+        return "cost", "an unknown amount"
+    loss = _unsigned_zero(100.0 * (without - with_errors), 1)
+    return "cost" if loss >= 0.0 else "gave", f"{abs(loss):.1f} points of TPR"
+
+
+def stamp_words(cameras: Sequence[CameraSensor]) -> str:
+    """What a reader must know of stamps that are late by themselves; empty where none are."""
+    late = [ends(camera.stamp_delay_ms) for camera in cameras if camera.stamp == "arrival"]
+    if not late:
+        return ""
+    low, high = min(low for low, _ in late), max(high for _, high in late)
+    span = f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    return (
+        f"With and without errors, cameras stamp an image when the host has it, at least {span} ms after its "
+        "exposure; a shutter that opens late makes up for part of that."
+    )
 
 
 def _one_sided(groups: Sequence[Group]) -> str:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from unittest import mock
 
 import numpy as np
 import pytest
+from jaxtyping import Float64
 
 from fusion.pipelines.probabilistic import Probabilistic, ProbabilisticConfig
 from fusion.shape import ShapeConfig
@@ -153,23 +155,62 @@ def test_the_size_of_pictures_is_a_parameter() -> None:
 # -- what must hold ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("system", ["car", "wearable"])
-@pytest.mark.parametrize("seed", [0, 1])
-def test_an_offset_of_100_ms_alone_moves_tpr_by_less_than_5_percent(system: str, seed: int) -> None:
-    """Without shake, over the whole manoeuvre: the paper's error by itself hardly hurts the mapping."""
-    tpr = []
+@cache
+def tpr_and_recall(system: str, seed: int, *, honest_stamps: bool) -> Float64[np.ndarray, "2 2 2"]:
+    """By offset (0, 100 ms), pipeline and metric; over the whole manoeuvre without shake, on the same scans.
+
+    Every fourth LiDAR column, but pictures of full size: in smaller ones the detector misses far riders, and
+    the boxes that happen to be missed move `tpr` of a run by as much as the offset does.
+    """
+    found = []
     captured = None
     for offset_ms in (0.0, 100.0):
         at = staged(
             system, seed, specs=(TriggerOffset(offset_ms=offset_ms),), duration_s=None, columns=256,
-            size_px=(320, 200), background=True,
+            size_px=None, background=True,
         )  # fmt: skip
+        if honest_stamps:
+            at = with_honest_stamps(at)
         captured = recorded(at, seed) if captured is None else with_scans_of(captured, at, seed)
         cases = [run_case(name, captured) for name in ("static_projection", "probabilistic")]
         assert {c.status for c in cases} == {"ok"}
-        tpr.append([next(r.value for r in c.rows if r.metric == "tpr") for c in cases])
-    moved = np.subtract(tpr[1], tpr[0])
+        found.append([[_row(c, "tpr"), _row(c, "recall")] for c in cases])
+    return np.array(found)
+
+
+def with_honest_stamps(at: Stage) -> Stage:
+    """The stage with cameras that stamp the middle of their exposure."""
+    honest = {"stamp": "mid_exposure", "stamp_delay_ms": 0.0, "stamp_jitter_ms": 0.0}
+    cameras = {name: camera.model_copy(update=honest) for name, camera in at.rig.cameras.items()}
+    return replace(at, rig=replace(at.rig, cameras=cameras))
+
+
+def _row(found: Case, metric: str) -> float:
+    value = next(row.value for row in found.rows if row.metric == metric)
+    assert value is not None
+    return value
+
+
+@pytest.mark.parametrize(("system", "seed"), [("car", 0), ("car", 1), ("wearable", 0)])
+def test_an_offset_of_100_ms_alone_moves_tpr_by_less_than_5_percent(system: str, seed: int) -> None:
+    """The paper's error by itself hardly hurts the mapping.
+
+    By itself: without shake, and with stamps that tell the truth. The wearable's host stamps are late by 20
+    to 100 ms on their own (the next test). Whole sensors, seeds 0-3: car at most 0.036, wearable 0.023.
+    """
+    on_time, late = tpr_and_recall(system, seed, honest_stamps=True)
+    moved = (late - on_time)[:, 0]
     assert (np.abs(moved) < 0.05).all(), moved
+
+
+def test_an_offset_of_100_ms_makes_up_for_stamps_that_are_late_by_nearly_as_much() -> None:
+    """A host that stamps late and a shutter that opens late err in opposite directions: together they hide
+    each other, and more of the target's points fall into its box than with either alone."""
+    late_stamps, both = tpr_and_recall("wearable", 0, honest_stamps=False)[:, 0, 1]
+    honest, late_shutter = tpr_and_recall("wearable", 0, honest_stamps=True)[:, 0, 1]
+    assert both > late_stamps + 0.05, (late_stamps, both)
+    assert honest > late_stamps + 0.05, (late_stamps, honest)
+    assert both > late_shutter, (late_shutter, both)
 
 
 def test_the_literal_argmax_of_kl_lowers_the_score() -> None:

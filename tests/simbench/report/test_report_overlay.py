@@ -68,6 +68,17 @@ def test_the_field_has_its_aspect_and_holds_what_lies_in_the_image(
     assert x0 <= box[0] + 1e-6 and box[2] <= x1 + 1e-6 and y0 <= box[1] + 1e-6 and box[3] <= y1 + 1e-6
 
 
+@given(st.floats(-400, 900), st.floats(-400, 560), st.floats(4, 2000), st.floats(4, 2000))
+def test_a_target_that_is_larger_than_the_image_is_shown_with_all_of_the_image_and_little_beside_it(
+    x: float, y: float, w: float, h: float
+) -> None:
+    box = (max(x, 0.0), max(y, 0.0), min(x + max(w, 4.0 - x), 960.0), min(y + max(h, 4.0 - y), 600.0))
+    shown = replace(view(1), box_px=box, outline_px=(x, y, x + w, y + h), true_px=(x, y), told_px=(x + w, y))
+    x0, y0, x1, y1 = common_field([marks_of(shown, "probabilistic", CAMERA)], CAMERA)
+    assert x1 - x0 <= 960.0 + 1e-6 and y1 - y0 <= 960.0 / (WIDTH / HEIGHT) + 1e-6
+    assert x0 >= -1e-6 and x1 <= 960.0 + 1e-6
+
+
 def test_a_pixel_of_the_picture_lands_where_the_drawing_puts_it() -> None:
     for sharper in (1, 2):
         picture = np.zeros((600 * sharper, 960 * sharper, 3), dtype=np.uint8)

@@ -245,7 +245,7 @@ def test_what_could_not_be_drawn_again_is_said(page: str) -> None:
 def test_the_page_says_how_to_make_it_again_and_what_it_does_not_show(page: str) -> None:
     text = Page(page).text
     assert "simbench demo" in text and "packages numpy" in text and "seeds 0, 1" in text
-    assert "simulated detector" in text and "assumed" in text
+    assert "simulated detector" in text and "assumed" in text and "no vignetting" in text
 
 
 def test_a_video_in_the_folder_is_linked_and_others_are_not(tmp_path: Path) -> None:

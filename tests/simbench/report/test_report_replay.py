@@ -122,7 +122,7 @@ def test_without_pictures_the_page_shows_points_on_a_plain_ground(result: JobRes
     path = write_report([result], tmp_path, command="x", images="none", environment={})
     text = path.read_text(encoding="utf-8")
     assert text.count('<svg class="crop"') >= 2 and 'class="outline"' in text
-    assert "<image" not in text
+    assert "<image" not in text and "Pictures are finer" not in text
     assert "Step 3: modes of the distance" in text and "S*" in text
 
 
@@ -134,6 +134,8 @@ def test_with_pictures_the_page_holds_them_and_stays_small(
         path = write_report([result], tmp_path, command="x", images=images, environment={})
     text = path.read_text(encoding="utf-8")
     assert text.count('<image href="data:image/jpeg;base64,') == text.count('<svg class="crop"') >= 2
+    assert text.count("Pictures are finer than the camera&#39;s, in colour") == 1
+    assert ("without noise, blur, JPEG" in text) == (images == "raycast")
     assert len(text) < 5_000_000
 
 

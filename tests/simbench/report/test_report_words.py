@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import pytest
 
+from scenarios.load import load_sensor
+from scenarios.scenario import CameraSensor
 from simbench.report.choose import groups_of, mean_of_runs
 from simbench.report.words import (
     fault_words,
@@ -18,6 +20,7 @@ from simbench.report.words import (
     runs_words,
     sentence,
     signed_m,
+    stamp_words,
 )
 from tests.simbench.report.make import PIPELINES, faults, result, without_target
 
@@ -80,6 +83,33 @@ def test_the_sentence_says_cost_recovery_and_n_with_the_numbers_of_the_rows() ->
     y = mean_of_runs(group, "faulted", "probabilistic", "mae_m.raw")
     assert f"position error {metres(x)} → {metres(y)} m" in text
     assert text.endswith("n = 2 runs: illustration.")
+
+
+@pytest.mark.parametrize(
+    ("car", "wearable", "start"),
+    [
+        (0.6, 0.7, "cost the raw box 20.0 points of TPR on the car (80.0 → 60.0 %) and 10.0 points"),
+        (0.6, 0.9, "cost the raw box 20.0 points of TPR on the car (80.0 → 60.0 %) and gave it 10.0"),
+        (0.9, 0.6, "gave the raw box 10.0 points of TPR on the car (80.0 → 90.0 %) and cost it 20.0"),
+        (0.8, 0.9, "cost the raw box 0.0 points of TPR on the car (80.0 → 80.0 %) and gave it 10.0"),
+    ],
+)
+def test_a_gain_is_not_called_a_cost(car: float, wearable: float, start: str) -> None:
+    results = [
+        result(system=system, errors=errors, tpr={"static_projection": [value if errors else 0.8] * 4})
+        for system, value in (("car", car), ("wearable", wearable))
+        for errors in ((), ("demo",))
+    ]
+    text = sentence(groups_of(results)).replace("\N{NO-BREAK SPACE}", " ")
+    assert text.startswith(f"50 ms trigger offset and 1.1 deg vibration {start}"), text
+
+
+def test_stamps_that_are_late_by_themselves_are_said() -> None:
+    late, early = (load_sensor(name) for name in ("camera-78deg-usb", "camera-40deg"))
+    assert isinstance(late, CameraSensor) and isinstance(early, CameraSensor)
+    assert "at least 20 to 100 ms after" in stamp_words([early, late])
+    assert "at least 30 ms after" in stamp_words([late.model_copy(update={"stamp_delay_ms": 30.0})])
+    assert stamp_words([early]) == "" and stamp_words([]) == ""
 
 
 def test_the_sentence_is_one_sentence_in_every_situation() -> None:
