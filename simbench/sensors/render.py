@@ -25,7 +25,8 @@ class Renderer:
 
     def __init__(self, world: World, fine: bool = False) -> None:
         """`fine`: round things rounder and shadows sharper, at three times the cost (stills, comparisons)."""
-        gl.provision()
+        found = gl.provision()
+        gl.use(found.name)  # another choice may have been made in this process since
         import mujoco
 
         self._mujoco = mujoco
@@ -37,7 +38,14 @@ class Renderer:
         quality.numslices, quality.numstacks = (48, 32) if fine else (12, 8)
         self._context_gl = mujoco.GLContext(16, 16)
         self._context_gl.make_current()
-        self._context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        try:
+            self._context = mujoco.MjrContext(self.model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            self._context_gl.free()
+            raise gl.RenderingUnavailable(
+                f"MuJoCo cannot draw with {found.name} in this process: {error}; let rays take the pictures "
+                "(--images raycast)"
+            ) from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
         self._scene = mujoco.MjvScene(self.model, MAX_GEOMS)
         self._option = mujoco.MjvOption()
