@@ -114,9 +114,10 @@ def capture(
 def _scans(
     rig: SensorRig, motion: Motion, duration_s: float, seed: int, ideal: bool
 ) -> Iterator[tuple[LidarScan, ScanTruth]]:
-    for seq in range(rig.sweeps(duration_s)):
-        rng = None if ideal else stream(seed, "lidar", rig.lidar_name, str(seq))
-        yield lidar.sweep(rig.lidar_name, rig.lidar, motion, seq * lidar.period_ns(rig.lidar), seq, rng)
+    def rng(seq: int) -> np.random.Generator | None:
+        return None if ideal else stream(seed, "lidar", rig.lidar_name, str(seq))
+
+    return lidar.sweeps(rig.lidar_name, rig.lidar, motion, rig.sweeps(duration_s), rng)
 
 
 def _shots(
@@ -133,6 +134,7 @@ def _shots(
     world, pinhole = motion.world, rig.pinholes[name]
     by_rows = timing.line_delay_ns != 0.0 or any(pinhole.distortion)
     taken_ns = timing.mid_ns + drawn.delays_ns.get(name, 0)
+    sought = _Sought(world, rig.rig.detector.categories, ego)
     edge_errors = dict(drawn.edge_errors.get(name, {}))
     detector = Detector(rig.rig.detector, name, pinhole, world.objects, len(taken_ns), seed, edge_errors)
     poses, (rotation, position) = motion.sensor(name, taken_ns), motion.poses(taken_ns)
@@ -144,7 +146,7 @@ def _shots(
             view = RowView(exposure_at(motion, name, t_ns), pinhole)
         else:
             view = View(world.geoms, rotation[seq], position[seq], T_world_camera, pinhole)
-        boxes = _boxes_in(view, world, rig.rig.detector.categories, ego)
+        boxes = sought.boxes_in(view)
         detected = detector.detect(seq, boxes)
         late_ns = capture_ns - int(timing.mid_ns[seq])
         stamp_ns, arrival_ns = int(timing.stamp_ns[seq]), int(timing.arrival_ns[seq]) + late_ns
@@ -189,17 +191,23 @@ def in_order_of_arrival(messages: list[Measurement]) -> tuple[Measurement, ...]:
     )
 
 
-def _boxes_in(view: View, world: World, categories: tuple[str, ...], ego: str) -> tuple[TrueBox, ...]:
-    """True boxes of all detectable objects near enough, in order of object id; the ego itself is not one."""
-    wanted = [o.object_id for o in world.objects if o.category in categories and o.name != ego]
-    first = np.array(world.first_geom, dtype=np.int64)[wanted]
-    # Every geom of an object lies within its size of any other one's centre.
-    reach_m = np.array([np.linalg.norm(world.objects[i].size_m) for i in wanted])
-    shown = view.may_show(first, reach_m)
-    shown &= np.linalg.norm(view.centre_camera_m[first], axis=1) <= FARTHEST_BOX_M + reach_m
-    result = []
-    for object_id, may_show in zip(wanted, shown, strict=True):
-        box = true_box(view, object_id, world.masks[object_id], min_height_px=4.0) if may_show else None
-        if box is not None:
-            result.append(box)
-    return tuple(result)
+class _Sought:
+    """The detectable objects of a world but the ego: by object id, with their geoms and sizes."""
+
+    def __init__(self, world: World, categories: tuple[str, ...], ego: str) -> None:
+        found = [o for o in world.objects if o.category in categories and o.name != ego]
+        self.geoms = {o.object_id: np.flatnonzero(world.masks[o.object_id]) for o in found}
+        self.first = np.array([world.first_geom[o.object_id] for o in found], dtype=np.int64)
+        # Every geom of an object lies within its size of any other one's centre.
+        self.reach_m = np.array([np.linalg.norm(o.size_m) for o in found], dtype=np.float64)
+
+    def boxes_in(self, view: View) -> tuple[TrueBox, ...]:
+        """True boxes of all of them that are near enough, in order of object id."""
+        shown = view.may_show(self.first, self.reach_m)
+        shown &= np.linalg.norm(view.centre_camera_m[self.first], axis=1) <= FARTHEST_BOX_M + self.reach_m
+        found = (
+            true_box(view, object_id, geoms, min_height_px=4.0)
+            for (object_id, geoms), may_show in zip(self.geoms.items(), shown, strict=True)
+            if may_show
+        )
+        return tuple(box for box in found if box is not None)

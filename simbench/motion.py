@@ -30,6 +30,16 @@ def rotations_about(
     return turned
 
 
+def rotations_about_z(angle_rad: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 3 3"]:
+    """The same about the z axis, which is needed most."""
+    turned = np.zeros((len(angle_rad), 3, 3))
+    cosine, sine = np.cos(angle_rad), np.sin(angle_rad)
+    turned[:, 0, 0], turned[:, 0, 1] = cosine, -sine
+    turned[:, 1, 0], turned[:, 1, 1] = sine, cosine
+    turned[:, 2, 2] = 1.0
+    return turned
+
+
 def rotations_rpy(rpy_rad: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3 3"]:
     """Rz(yaw) Ry(pitch) Rx(roll) for rows (roll, pitch, yaw) in radians."""
     rx = rotations_about(np.array([1.0, 0.0, 0.0]), rpy_rad[:, 0])
@@ -175,8 +185,9 @@ class Motion:
 
     def _script(self, actor: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:
         xy, heading = self.world.actors[actor].track.at(t_ns)
-        rotation = rotations_about(np.array([0.0, 0.0, 1.0]), heading)
-        return rotation, np.column_stack([xy, np.zeros(len(xy))])
+        position = np.zeros((len(xy), 3))
+        position[:, :2] = xy
+        return rotations_about_z(heading), position
 
     def _root(self, actor: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:
         if actor != self.ego_actor:

@@ -13,7 +13,7 @@ from simbench.sensors.lens import row_fans
 from simbench.sensors.outline import NEAR_M, outline_px
 from simbench.truth import TrueBox
 
-MOVED_M = 1.0  # more than anything moves while an image is read out
+SLIM_PX = 2.0  # what is slimmer may slip between pixels
 Window = tuple[int, int, int, int]
 """Pixels (x0, y0, x1, y1), x1 and y1 not in it."""
 
@@ -55,17 +55,16 @@ class View:
             shown &= (value - high * z) / np.hypot(1.0, high) <= radius_m
         return shown
 
-    def outline(self, mask: Bool[np.ndarray, " g"]) -> BoxPx | None:
-        """The unclipped extent of the geoms in `mask`; the whole image plane where they reach behind it.
+    def outline(self, geom: Int[np.ndarray, " n"]) -> BoxPx | None:
+        """The unclipped extent of some geoms; the whole image plane where they reach behind it.
 
         None when nothing of them is in front of the camera or inside the image.
         """
-        which = np.flatnonzero(mask)
-        centre_m = self.centre_camera_m[which]
-        if (centre_m[:, 2] + self.geoms.bound_m[which]).max() < NEAR_M:
+        centre_m = self.centre_camera_m[geom]
+        if (centre_m[:, 2] + self.geoms.bound_m[geom]).max() < NEAR_M:
             return None
-        rotation = self.T_world_camera.rotation.T @ self.placed.still[which, :9].reshape(-1, 3, 3)
-        kind, size_m = self.geoms.kind[which], self.geoms.size_m[which]
+        rotation = self.T_world_camera.rotation.T @ self.placed.still[geom, :9].reshape(-1, 3, 3)
+        kind, size_m = self.geoms.kind[geom], self.geoms.size_m[geom]
         box = outline_px(kind, size_m, rotation, centre_m, self.camera)
         width, height = float(self.camera.width_px), float(self.camera.height_px)
         if box is None:
@@ -74,60 +73,94 @@ class View:
             return None
         return box
 
-    def cast(self, window: Window, mask: Bool[np.ndarray, " g"]) -> Int[np.ndarray, "r c"]:
-        """Geom index (into the full table) at every pixel of a window, among those in `mask`; -1: nothing."""
-        pose = self.T_world_camera
-        return rays.cast_window(
-            self.placed,
-            np.flatnonzero(mask),
-            np.zeros(1, dtype=np.int64),
-            np.zeros(1),
-            pose.rotation[None],
-            pose.translation_m[None],
-            row_fans(self.camera),
-            np.zeros_like(row_fans(self.camera).pose),
-            window,
+    def hiders(self, window: Window, geom: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+        """Other geoms that may stand before one of some, in a window; may name too many."""
+        pose, camera = self.T_world_camera, self.camera
+        x0, y0, x1, y1 = window
+        slopes = (
+            (x0 - camera.cx_px) / camera.fx_px,
+            (y0 - camera.cy_px) / camera.fy_px,
+            (x1 - camera.cx_px) / camera.fx_px,
+            (y1 - camera.cy_px) / camera.fy_px,
         )
+        return rays.hiders(self.placed, geom, pose.translation_m, pose.rotation, slopes)
+
+    def cast(self, window: Window, geom: Int[np.ndarray, " n"]) -> rays.Hits:
+        """What the rays [r c] of a window's pixels meet first among some geoms."""
+        pose, fans = self.T_world_camera, row_fans(self.camera)
+        still = np.zeros(1)
+        return rays.cast_window(
+            self.placed, geom, still.astype(np.int64), still, pose.rotation[None], pose.translation_m[None],
+            fans, np.zeros_like(fans.pose), window,
+        )  # fmt: skip
 
 
-def true_box(
-    view: View, object_id: int, mask: Bool[np.ndarray, " g"], min_height_px: float
-) -> TrueBox | None:
-    """Amodal box (clipped to the image), visible box and visible fraction of one object; None when out of
-    view or its outline is lower than `min_height_px`. The visible box is exact to the pixel."""
-    outline = view.outline(mask)
+def true_box(view: View, object_id: int, geom: Int[np.ndarray, " n"], min_height_px: float) -> TrueBox | None:
+    """Amodal box (clipped to the image), visible box and visible fraction of one object, which is made of the
+    geoms `geom`; None when out of view or its outline is lower than `min_height_px`.
+
+    The visible box of what nothing can hide is the amodal one; else it is found by rays, to the pixel.
+    """
+    outline = view.outline(geom)
     if outline is None or outline[3] - outline[1] < min_height_px:
         return None
     width, height = view.camera.width_px, view.camera.height_px
     x0, y0 = max(int(np.floor(outline[0])), 0), max(int(np.floor(outline[1])), 0)
     x1, y1 = min(int(np.ceil(outline[2])), width), min(int(np.ceil(outline[3])), height)
     window = (x0, y0, x1, y1)
-    first = view.cast(window, np.ones_like(mask))
-    seen = (first >= 0) & mask[first]
-    own = view.cast(window, mask) >= 0 if not seen.any() or may_hide(view, first, mask) else seen
-    if not own.any():
-        return None
     truncated = outline[0] < 0 or outline[1] < 0 or outline[2] > width or outline[3] > height
+    alone: rays.Hits | None = None
+    amodal = visible = outline
+    if truncated or outline[2] - outline[0] < SLIM_PX:
+        alone = view.cast(window, geom)
+        if not (alone.geom >= 0).any():
+            return None
+        visible = _extent(alone.geom >= 0, window)
+        amodal = visible if truncated else outline
+        alone, window = _part(alone, window, visible), _pixels(visible)
+    others = view.hiders(window, geom)
+    before = view.cast(window, others) if len(others) else None
+    if before is None or not _hides(before, view, geom, alone, window):
+        return TrueBox(object_id=object_id, amodal_px=amodal, visible_px=visible, visible_fraction=1.0)
+    if alone is None:
+        alone = view.cast(window, geom)
+    own = alone.geom >= 0
+    seen = own & (alone.range_m <= before.range_m)
     return TrueBox(
         object_id=object_id,
-        amodal_px=_extent(own, x0, y0) if truncated else outline,
-        visible_px=_extent(seen, x0, y0) if seen.any() else None,
+        amodal_px=amodal,
+        visible_px=_extent(seen, window) if seen.any() else None,
         visible_fraction=float(np.count_nonzero(seen) / np.count_nonzero(own)),
     )
 
 
-def may_hide(view: View, first: Int[np.ndarray, "r c"], mask: Bool[np.ndarray, " g"]) -> bool:
-    """Whether one of the geoms that are seen may stand before one of those in `mask`, by their distances."""
-    distance_m, bound_m = np.linalg.norm(view.centre_camera_m, axis=1), view.geoms.bound_m
-    shown = np.zeros(len(mask) + 1, dtype=np.bool_)
-    shown[first] = True  # the last for -1, nothing
-    farthest_m = (distance_m + bound_m)[mask].max() + MOVED_M
-    other = shown[:-1] & ~mask & np.isfinite(bound_m)  # the ground hides nothing that stands on it
-    return bool((distance_m[other] - bound_m[other] < farthest_m).any())
+def _hides(
+    before: rays.Hits, view: View, geom: Int[np.ndarray, " n"], alone: rays.Hits | None, window: Window
+) -> bool:
+    """Whether anything that rays met in a window stands before one of some geoms; what they met of
+    these `alone` is cast where it is needed, if it is not there."""
+    if not (before.geom >= 0).any():
+        return False
+    met = _extent(before.geom >= 0, window)
+    there = view.cast(_pixels(met), geom) if alone is None else _part(alone, window, met)
+    return bool(((there.geom >= 0) & (_part(before, window, met).range_m < there.range_m)).any())
 
 
-def _extent(shown: Bool[np.ndarray, "r c"], x0: int, y0: int) -> BoxPx:
-    """The extent of the pixels that show something, the first of which is (x0, y0)."""
+def _part(hits: rays.Hits, window: Window, box_px: BoxPx) -> rays.Hits:
+    """Those of a window's hits that are in a box."""
+    x0, y0, x1, y1 = _pixels(box_px)
+    part = np.s_[y0 - window[1] : y1 - window[1], x0 - window[0] : x1 - window[0]]
+    return rays.Hits(range_m=hits.range_m[part], geom=hits.geom[part], cosine=hits.cosine[part])
+
+
+def _pixels(box_px: BoxPx) -> Window:
+    x0, y0, x1, y1 = box_px
+    return int(x0), int(y0), int(x1), int(y1)
+
+
+def _extent(shown: Bool[np.ndarray, "r c"], window: Window) -> BoxPx:
+    """The extent of the pixels of a window that show something."""
+    x0, y0 = window[:2]
     columns, rows = np.flatnonzero(shown.any(axis=0)), np.flatnonzero(shown.any(axis=1))
     return (
         float(x0 + columns[0]), float(y0 + rows[0]), float(x0 + columns[-1] + 1), float(y0 + rows[-1] + 1)

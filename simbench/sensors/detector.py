@@ -123,8 +123,9 @@ class Detector:
             e = self.edge_errors[object_id][frame]
             w, h = x1 - x0, y1 - y0
             x0, y0, x1, y1 = x0 + e[0] * w, y0 + e[1] * h, x1 + e[2] * w, y1 + e[3] * h
-        x0, x1 = np.clip([x0, x1], 0.0, self.camera.width_px)
-        y0, y1 = np.clip([y0, y1], 0.0, self.camera.height_px)
+        width, height = float(self.camera.width_px), float(self.camera.height_px)
+        x0, x1 = min(max(x0, 0.0), width), min(max(x1, 0.0), width)
+        y0, y1 = min(max(y0, 0.0), height), min(max(y1, 0.0), height)
         if x1 - x0 < 1.0 or y1 - y0 < 1.0:
             return None
         return (float(x0), float(y0), float(x1), float(y1))

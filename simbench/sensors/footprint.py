@@ -2,12 +2,13 @@
 
 A beam is a Gaussian cone. Its footprint is sampled by 19 rays on a hexagonal grid one standard deviation
 apart, each with the Gaussian's weight. A footprint that one geom fills returns like its middle ray, so all
-rays are cast only for *edge beams*, whose footprint may hold two surfaces. Two tests find them:
+rays are cast only for *edge beams*, whose footprint may hold two surfaces. All others pass two tests:
 
-* One cast of the middle rays against all geoms **grown** by the footprint's radius at their distance, the
-  ground left out. A surface that reaches into a footprint is met so however thin it is, also between beams.
-* Where the middle ray and the grown one meet the same geom, the six **rim** rays of the footprint. Geoms are
-  convex: what all six meet fills the hexagon between them.
+* The geom that the middle ray meets, being convex, **fills** the cone of the footprint somewhere: made
+  smaller on all sides by the footprint's radius, it is still met. So every ray of the beam meets it.
+* None **other** comes before that: against all other geoms **grown** by the footprint's radius at their
+  distance, the ground left out, the middle ray meets nothing nearer. A surface that reaches into a footprint
+  is met so however thin it is, also between beams.
 
 The horizon is no edge here: the ground returns nothing from there.
 
@@ -17,8 +18,10 @@ weighted by power (weight x reflectivity / range^2); of several returns the stro
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
-from jaxtyping import Bool, Float64
+from jaxtyping import Bool, Float64, Int64
 
 from scenarios.scenario import LidarSensor
 from simbench.sensors import rays
@@ -45,7 +48,9 @@ SAMPLES = _hexagonal()
 _BELL = np.exp(-0.5 * (SAMPLES**2).sum(axis=1))
 WEIGHTS = _BELL / _BELL.sum()
 SPECK_M = 1e-9
-RIM = np.hypot(*SAMPLES.T) > 1.9
+RADIUS_SD = 2.0  # of the footprint: that of its outer rays
+DEPTH_RATIO = 1.3  # see _depth_ratio
+DEEPEST_M = 1.0  # and no deeper
 
 
 def beam_sd_rad(sensor: LidarSensor) -> Float64[np.ndarray, "2"]:
@@ -73,16 +78,46 @@ def grown(geoms: Geoms, by_m: Float64[np.ndarray, " n"]) -> Geoms:
 
 
 def edge_beams(shot: Shot, hits: rays.Hits, sd_rad: Float64[np.ndarray, "2"]) -> Bool[np.ndarray, "g k"]:
-    """Which beams' footprints may hold more than one surface."""
-    geoms = shot.world.geoms
-    near = shot.cast(grown(geoms, _farthest_m(shot) * np.tan(2.0 * sd_rad.max())))
-    plane = geoms.kind == rays.PLANE
-    outlined = np.append(~plane, False)[hits.geom]  # neither the ground nor the sky
-    edge = np.where(outlined, near.geom != hits.geom, near.geom >= 0)
-    row, column = np.nonzero(outlined & ~edge)
-    rim = shot.cast_beside(SAMPLES[RIM] * sd_rad, row, column)
-    edge[row, column] = (rim.geom != hits.geom[row, column][:, None]).any(axis=1)
+    """Which beams' footprints may hold more than one surface; none that does is left out."""
+    geoms, widening = shot.world.geoms, float(np.tan(RADIUS_SD * sd_rad.max()))
+    limits = rays.empty_hits(hits.geom.shape)
+    _limits(
+        hits.range_m, hits.geom, hits.cosine, geoms.kind == rays.PLANE, widening * _depth_ratio(geoms),
+        limits.range_m, limits.geom, limits.cosine,
+    )  # fmt: skip
+    limit_m, own = limits.range_m.copy(), limits.geom.copy()
+    shot.cast_onto(limits, grown(geoms, widening * _farthest_m(shot)))
+    edge = limits.geom != own
+    row, column = places((own >= 0) & ~edge)
+    edge[row, column] = ~shot.filled(row, column, own[row, column], widening, limit_m[row, column])
     return edge
+
+
+def places(where: Bool[np.ndarray, "g k"]) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
+    """`np.nonzero`, but quick."""
+    return np.divmod(np.flatnonzero(where), where.shape[1])
+
+
+def _depth_ratio(geoms: Geoms) -> Float64[np.ndarray, " n"]:
+    """How deep below its surface, in radii, a geom's footprint is looked for: one is enough where it is flat
+    and met head on. An ellipsoid is shrunk in proportion, so most along its longest axis."""
+    longest, shortest = geoms.size_m.max(axis=1), np.maximum(geoms.size_m.min(axis=1), 1e-9)
+    return DEPTH_RATIO * np.where(geoms.kind == rays.ELLIPSOID, longest / shortest, 1.0)
+
+
+@jit
+def _limits(range_m, geom, cosine, ground, depth, out_range, out_geom, out_cosine):  # type: ignore[no-untyped-def]
+    """How far along each ray another surface matters: to where its own surface fills the cone about it. The
+    ground and the sky have no limit, and count as no geom."""
+    for g in range(geom.shape[0]):
+        for k in range(geom.shape[1]):
+            i = geom[g, k]
+            out_cosine[g, k] = 0.0
+            if i < 0 or ground[i]:
+                out_range[g, k], out_geom[g, k] = np.inf, -1
+                continue
+            deep = depth[i] * range_m[g, k] / max(float(cosine[g, k]), 1e-3)
+            out_range[g, k], out_geom[g, k] = range_m[g, k] + min(deep, DEEPEST_M), i
 
 
 def _farthest_m(shot: Shot) -> Float64[np.ndarray, " n"]:
@@ -101,17 +136,12 @@ def mixed(
     edge: Bool[np.ndarray, "g k"],
     echoes: Echoes,
 ) -> Echoes:
-    """`echoes` with those of the edge beams replaced by what their whole footprints return."""
+    """`echoes` with those of the edge beams replaced, in place, by what their whole footprints return."""
     world = shot.world
-    row, column = np.nonzero(edge)
+    row, column = places(edge)
     hits = shot.cast_beside(SAMPLES * beam_sd_rad(sensor), row, column)
-    result = Echoes(
-        range_m=echoes.range_m.copy(),
-        true_range_m=echoes.true_range_m.copy(),
-        geom=echoes.geom.copy(),
-        cosine=echoes.cosine.copy(),
-        reflectivity=echoes.reflectivity.copy(),
-    )
+    # Only the true range has to be parted from the range; nobody else holds these arrays.
+    result = replace(echoes, true_range_m=echoes.true_range_m.copy())
     _mix(
         hits.range_m, hits.geom, hits.cosine, WEIGHTS, world.reflectivity, world.roughness_gain,
         sensor.merge_m, row, column,
@@ -129,10 +159,16 @@ def _mix(  # type: ignore[no-untyped-def]
     samples = weight.shape[0]
     order, back, power = np.empty(samples, np.int64), np.empty(samples), np.empty(samples)
     for n in range(row.shape[0]):
-        hit, alone = 0, True
+        alone = True
+        for s in range(1, samples):
+            if geom[n, s] != geom[n, 0]:
+                alone = False
+                break
+        if alone:
+            continue  # one geom, or nothing: the middle ray says it all
+        hit = 0
         for s in range(samples):
             g = geom[n, s]
-            alone = alone and g == geom[n, 0]
             if g < 0:
                 continue
             x = float(cosine[n, s])
@@ -144,8 +180,6 @@ def _mix(  # type: ignore[no-untyped-def]
                 place -= 1
             order[place] = s
             hit += 1
-        if alone:
-            continue  # one geom, or nothing: the middle ray says it all
         # Along the range, a gap of `merge` ends a return. The nearest of equally strong ones wins.
         best, best_first, best_end, first = -1.0, 0, 0, 0
         total = 0.0
@@ -164,12 +198,19 @@ def _mix(  # type: ignore[no-untyped-def]
             s = order[i]
             mean += power[s] * distance[n, s]
             sent += back[s]
-            of_geom = 0.0
-            for k in range(best_first, best_end):
-                if geom[n, order[k]] == geom[n, s]:
-                    of_geom += power[order[k]]
-            if of_geom > most or (of_geom == most and power[s] > power[main]):
-                most, main = of_geom, s
+            known = False
+            for k in range(best_first, i):
+                known = known or geom[n, order[k]] == geom[n, s]
+            if known:
+                continue
+            of_geom, brightest = 0.0, s
+            for k in range(i, best_end):
+                q = order[k]
+                if geom[n, q] == geom[n, s]:
+                    of_geom += power[q]
+                    brightest = q if power[q] > power[brightest] else brightest
+            if of_geom > most:
+                most, main = of_geom, brightest
         out_range[r, c] = mean / best
         out_true[r, c] = distance[n, main]
         out_geom[r, c] = geom[n, main]

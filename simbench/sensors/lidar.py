@@ -8,6 +8,7 @@ sensor file and can be switched off by name (`LidarSensor.off`).
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import get_args
 
 import numpy as np
@@ -18,13 +19,23 @@ from simbench.motion import Motion
 from simbench.sensors import footprint, returns
 from simbench.sensors.beams import BeamTable, beam_table, passing_offset_ns, period_ns
 from simbench.sensors.returns import Echoes
-from simbench.sensors.shot import Shot, aim
+from simbench.sensors.shot import Course, Shot, aim, courses
 from simbench.truth import ScanTruth
 from simbench.world import GROUND
 
-__all__ = ["EFFECTS", "BeamTable", "beam_table", "passing_offset_ns", "period_ns", "sweep", "without"]
+__all__ = [
+    "EFFECTS",
+    "BeamTable",
+    "beam_table",
+    "passing_offset_ns",
+    "period_ns",
+    "sweep",
+    "sweeps",
+    "without",
+]
 
 EFFECTS: tuple[LidarEffect, ...] = get_args(LidarEffect)
+AT_ONCE = 16  # sweeps whose poses are found together
 LIMITS: tuple[LidarEffect, ...] = ("range_law",)  # what an ideal sensor keeps beside its minimum range
 
 
@@ -40,8 +51,9 @@ def sweep(
     start_ns: int,
     seq: int,
     rng: np.random.Generator | None,
+    course: Course | None = None,
 ) -> tuple[LidarScan, ScanTruth]:
-    """One sweep that starts at true time `start_ns`.
+    """One sweep that starts at true time `start_ns`. course: see `aim`.
 
     Without `rng` the sensor is ideal: exact ranges along exact beams without width, nothing lost and nothing
     false; how far it sees is no error but a limit, so it keeps that (sharp at R(rho)) and its minimum range.
@@ -56,9 +68,8 @@ def sweep(
     draws = returns.middle(sensor) if rng is None else returns.draw(sensor, rng)
     table = beam_table(sensor)
     angle_noise_deg = 0.0 if "angle_noise" in sensor.off else sensor.angle_noise_deg
-    shot = aim(
-        name, motion, table, start_ns, draws.azimuth_noise, draws.elevation_noise, np.deg2rad(angle_noise_deg)
-    )
+    sd_rad = float(np.deg2rad(angle_noise_deg))
+    shot = aim(name, motion, table, start_ns, draws.azimuth_noise, draws.elevation_noise, sd_rad, course)
     points = returns.deliver(sensor, table, _echoes(sensor, shot), draws)
 
     offset_ns = table.fire_offset_ns[points.column, points.beam]
@@ -82,6 +93,22 @@ def sweep(
         incidence_rad=points.incidence_rad,
     )
     return scan, truth
+
+
+def sweeps(
+    name: str,
+    sensor: LidarSensor,
+    motion: Motion,
+    count: int,
+    rng: Callable[[int], np.random.Generator | None],
+) -> Iterator[tuple[LidarScan, ScanTruth]]:
+    """The first `count` sweeps since true time 0, sweep i with rng(i)."""
+    table, step_ns = beam_table(sensor), period_ns(sensor)
+    for first in range(0, count, AT_ONCE):
+        seqs = np.arange(first, min(first + AT_ONCE, count))
+        ahead = courses(name, motion, table, seqs * step_ns)
+        for seq, course in zip(seqs.tolist(), ahead, strict=True):
+            yield sweep(name, sensor, motion, seq * step_ns, seq, rng(seq), course)
 
 
 def _echoes(sensor: LidarSensor, shot: Shot) -> Echoes:

@@ -2,7 +2,7 @@
 
 All helpers of these kernels live in this file: numba's cache does not notice a change in another file.
 
-`_cast`, `_cast_pixels`: groups of any rays that share an origin and an instant, one ray after the other.
+`_cast`: groups of any rays that share an origin and an instant, one ray after the other.
 `_cast_fans`: fans, four at a time, each with its own pose and instant. A fan is a set of rays
 e + s u + x n (frame e, u, n; slopes s ascending; skews x near 0). Fans of one plane sweep let each geom's
 extent be bounded by an interval of slopes, so that only the rays inside it are tested, by loops over four
@@ -20,6 +20,7 @@ PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # as mujoco
 LANES = 4  # fans that are cast together
 NOWHERE = -(2**62)  # where the rays of padding go
 RUN, RUN_CELLS = 64, 16  # pixels, and cells of the sun's grid, that are shaded together at most
+SUNK_M = 1e-3  # how deep in the ground a thing may stand and still count as standing on it
 BLOCK, SUPERBLOCK = 16, 64  # fans whose geoms are culled together, before those of LANES fans are
 
 
@@ -204,21 +205,18 @@ def _bounds(direction, axis, side):  # type: ignore[no-untyped-def]
 
 @jit
 def _cast_group(  # type: ignore[no-untyped-def]
-    kind, size, body, rotation, position, bound, wanted, body_R, body_p, origin, direction,
+    kind, size, body, rotation, position, bound, body_R, body_p, origin, direction,
     centre, index, nearest, frame, span, work, out_range, out_geom, out_cosine,
 ):  # fmt: skip
     """One group: rays `direction` [k 3] from `origin`, bodies at body_R [b 3 3], body_p [b 3].
 
-    centre, index, nearest, frame, span, work: scratch. out_*: rows of k. Geoms where `wanted` is False are
-    not there.
+    centre, index, nearest, frame, span, work: scratch. out_*: rows of k.
     """
     axis, side, o, d, n = work[0], work[1], work[2], work[3], work[4]
     cosine, sine = _bounds(direction, axis, side)
     cone_sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
     count = 0
     for i in range(kind.shape[0]):
-        if not wanted[i]:
-            continue
         b = body[i]
         for r in range(3):
             centre[i, r] = (
@@ -301,37 +299,13 @@ def _cast(  # type: ignore[no-untyped-def]
     out_range, out_geom, out_cosine,
 ):  # fmt: skip
     n = kind.shape[0]
-    wanted = np.ones(n, np.bool_)
     centre, index, nearest = np.empty((n, 3)), np.empty(n, np.int64), np.empty(n)
     frame, span, work = np.empty((n, 3, 3)), np.empty((n, 4)), np.empty((5, 3))
     for g in range(direction.shape[0]):
         t = time_index[g]
         _cast_group(
-            kind, size, body, rotation, position, bound, wanted, body_R[t], body_p[t], origin[g],
-            direction[g], centre, index, nearest, frame, span, work, out_range[g], out_geom[g], out_cosine[g],
-        )  # fmt: skip
-
-
-@jit
-def _cast_pixels(  # type: ignore[no-untyped-def]
-    kind, size, body, rotation, position, bound, wanted, body_R, body_p, R_world_camera, origin, x, y,
-    out_range, out_geom, out_cosine,
-):  # fmt: skip
-    """One column of pixels is one group: directions R @ (x, y, 1) for the slopes x [c], y [r]."""
-    n, rows = kind.shape[0], y.shape[0]
-    centre, index, nearest = np.empty((n, 3)), np.empty(n, np.int64), np.empty(n)
-    frame, span, work = np.empty((n, 3, 3)), np.empty((n, 4)), np.empty((5, 3))
-    direction = np.empty((rows, 3))
-    for c in range(x.shape[0]):
-        for r in range(rows):
-            norm = 1.0 / np.sqrt(x[c] * x[c] + y[r] * y[r] + 1.0)
-            for i in range(3):
-                direction[r, i] = norm * (
-                    R_world_camera[i, 0] * x[c] + R_world_camera[i, 1] * y[r] + R_world_camera[i, 2]
-                )
-        _cast_group(
-            kind, size, body, rotation, position, bound, wanted, body_R, body_p, origin, direction,
-            centre, index, nearest, frame, span, work, out_range[c], out_geom[c], out_cosine[c],
+            kind, size, body, rotation, position, bound, body_R[t], body_p[t], origin[g], direction[g],
+            centre, index, nearest, frame, span, work, out_range[g], out_geom[g], out_cosine[g],
         )  # fmt: skip
 
 
@@ -398,6 +372,78 @@ def _support(kind, size, x, y, z):  # type: ignore[no-untyped-def]
     else:
         half = size[0]
     return half * (1.0 + 1e-9) + 1e-9
+
+
+@jit
+def _hiders(kind, size, frame, mask, eye, axes, slopes, out):  # type: ignore[no-untyped-def]
+    """Which geoms, others than those in `mask`, may stand before one of these, into `out`; returns how many.
+
+    frame [g 12]: rotation row by row, then centre. eye [3]; axes [3 3]: columns right, down, ahead of the
+    view; slopes (x0, y0, x1, y1): the part of the view. Left out is what lies beside the pyramid of that
+    part, what lies behind all of those in `mask` as seen from the eye, and what lies below a level that the
+    eye and all of those in `mask` are above: a line of sight crosses none of these before it ends.
+    """
+    normal = np.empty((6, 3))
+    for r in range(3):
+        x, y, z = axes[r, 0], axes[r, 1], axes[r, 2]
+        normal[0, r], normal[1, r] = slopes[0] * z - x, x - slopes[2] * z
+        normal[2, r], normal[3, r] = slopes[1] * z - y, y - slopes[3] * z
+        normal[4, r], normal[5, r] = -z, 0.0
+    for i in range(kind.shape[0]):
+        if mask[i]:
+            for r in range(3):
+                normal[5, r] += frame[i, 9 + r] - eye[r]
+    for n in range(6):
+        length = np.sqrt(normal[n, 0] ** 2 + normal[n, 1] ** 2 + normal[n, 2] ** 2)
+        for r in range(3):
+            normal[n, r] /= max(length, 1e-12)
+    limit = np.zeros(6)  # beyond it along the normal: out of the way
+    lowest = np.inf
+    for i in range(kind.shape[0]):
+        if mask[i]:
+            limit[5] = max(limit[5], _reach(kind[i], size[i], frame[i], eye, normal[5], 1.0))
+            lowest = min(lowest, frame[i, 11] - _along(kind[i], size[i], frame[i], 0.0, 0.0, 1.0))
+    found = 0
+    for i in range(kind.shape[0]):
+        if mask[i]:
+            continue
+        hides = True
+        if kind[i] == PLANE:
+            top = 0.0
+            for r in range(3):
+                top = max(top, abs(frame[i, 3 * r + 2] - (1.0 if r == 2 else 0.0)))
+            top = frame[i, 11] if top < 1e-9 else np.inf  # a level one
+        else:
+            for n in range(6):
+                if _reach(kind[i], size[i], frame[i], eye, normal[n], -1.0) > limit[n]:
+                    hides = False
+                    break
+            if not hides:
+                continue
+            top = frame[i, 11] + _along(kind[i], size[i], frame[i], 0.0, 0.0, 1.0)
+        if hides and not (eye[2] > top and lowest > top - SUNK_M):
+            out[found] = i
+            found += 1
+    return found
+
+
+@jit_inline
+def _along(kind, size, frame, x, y, z):  # type: ignore[no-untyped-def]
+    """Half the extent of a geom along a direction of the world."""
+    return _support(
+        kind,
+        size,
+        abs(frame[0] * x + frame[3] * y + frame[6] * z),
+        abs(frame[1] * x + frame[4] * y + frame[7] * z),
+        abs(frame[2] * x + frame[5] * y + frame[8] * z),
+    )
+
+
+@jit_inline
+def _reach(kind, size, frame, eye, n, side):  # type: ignore[no-untyped-def]
+    """How far a geom reaches along the unit vector n from the eye, at most (side 1) or at least (side -1)."""
+    middle = (frame[9] - eye[0]) * n[0] + (frame[10] - eye[1]) * n[1] + (frame[11] - eye[2]) * n[2]
+    return middle + side * _along(kind, size, frame, n[0], n[1], n[2])
 
 
 @jit_inline
@@ -619,6 +665,20 @@ def _fans_capsule(size, M, o, slope, skew, start, stop, i, best, who, facing):  
             facing[j, lane] = cosine if hit else facing[j, lane]
 
 
+@jit_inline
+def _fans_solid(kind, size, M, o, slope, skew, start, stop, i, best, who, facing):  # type: ignore[no-untyped-def]
+    if kind == BOX:
+        _fans_box(size, M, o, slope, skew, start, stop, i, best, who, facing)
+    elif kind == CAPSULE:
+        _fans_capsule(size, M, o, slope, skew, start, stop, i, best, who, facing)
+    elif kind == CYLINDER:
+        _fans_cylinder(size, M, o, slope, skew, start, stop, i, best, who, facing)
+    elif kind == ELLIPSOID:
+        _fans_ellipsoid(size[0], size[1], size[2], M, o, slope, skew, start, stop, i, best, who, facing)
+    else:
+        _fans_ellipsoid(size[0], size[0], size[0], M, o, slope, skew, start, stop, i, best, who, facing)
+
+
 @jit
 def _lane_from_inside(kind, size, M, o, slope, skew, lane, begin, end, i, best, who, facing, work):  # type: ignore[no-untyped-def]
     """A sensor inside a geom sees its far side: one ray after the other."""
@@ -794,15 +854,105 @@ def _steps_down(M, slope, skew, begin, end):  # type: ignore[no-untyped-def]
     return first, last
 
 
+@jit_inline
+def _nothing(out_at, begin, end, stride, out_range, out_geom, out_cosine):  # type: ignore[no-untyped-def]
+    for lane in range(LANES):
+        if out_at[lane] != NOWHERE:
+            for j in range(begin, end):
+                at = out_at[lane] + j * stride
+                out_range[at], out_geom[at], out_cosine[at] = np.inf, -1, 0.0
+
+
+@jit_inline
+def _start_from(  # type: ignore[no-untyped-def]
+    out_at, begin, end, stride, out_range, out_geom, out_cosine, slope, skew, best, who, facing,
+):  # fmt: skip
+    """From hits in metres to lengths along e + s u + x n: the inverse of `_finish`."""
+    for lane in range(LANES):
+        if out_at[lane] != NOWHERE:
+            for j in range(begin, end):
+                at = out_at[lane] + j * stride
+                norm = np.sqrt(1.0 + slope[j, lane] * slope[j, lane] + skew[j, lane] * skew[j, lane])
+                best[j, lane], who[j, lane] = out_range[at] / norm, out_geom[at]
+                facing[j, lane] = out_cosine[at] * norm
+
+
+@jit_inline
+def _copy(start, stop, best, who, facing, to_best, to_who, to_facing):  # type: ignore[no-untyped-def]
+    for j in range(start, stop):
+        for lane in range(LANES):
+            to_best[j, lane], to_who[j, lane] = best[j, lane], who[j, lane]
+            to_facing[j, lane] = facing[j, lane]
+
+
+@jit_inline
+def _put_back(own, i, start, stop, kept_best, kept_who, kept_facing, best, who, facing):  # type: ignore[no-untyped-def]
+    """A ray's own geom does not replace what it has."""
+    for j in range(start, stop):
+        for lane in range(LANES):
+            if own[j, lane] == i:
+                best[j, lane], who[j, lane] = kept_best[j, lane], kept_who[j, lane]
+                facing[j, lane] = kept_facing[j, lane]
+
+
+@jit
+def _filled(  # type: ignore[no-untyped-def]
+    kind, size, row, still, table, key, weight, R, origin, pose_of, frame, slope, skew, scale, fan, step,
+    geom, widening, limit, out,
+):  # fmt: skip
+    """Whether geom[n], made smaller on all sides by the radius of the cone about ray step[n] of fan[n]
+    (`widening` times the distance), is still met by that ray, not beyond limit[n]."""
+    o, d, at, small, work = np.empty(3), np.empty(3), np.empty(12), np.empty(3), np.empty(3)
+    D = np.empty(3)
+    for n in range(fan.shape[0]):
+        f, i = fan[n], geom[n]
+        p = pose_of[f]
+        by = widening * limit[n]
+        out[n] = False
+        least = size[i, 0]
+        if kind[i] == CYLINDER:
+            least = min(least, size[i, 1])
+        elif kind[i] == BOX or kind[i] == ELLIPSOID:
+            least = min(least, size[i, 1], size[i, 2])
+        if kind[i] == PLANE or least <= by * (1.0 + 1e-9) + 1e-9:
+            continue
+        for r in range(3):
+            small[r] = size[i, r] * (1.0 - by / least) if kind[i] == ELLIPSOID else size[i, r] - by
+        if kind[i] == CAPSULE:
+            small[1] = size[i, 1]
+        if row[i] < 0:
+            for r in range(12):
+                at[r] = still[i, r]
+        else:
+            k, w = key[p], weight[p]
+            last = min(k + 1, table.shape[0] - 1)
+            for r in range(12):
+                at[r] = table[k, row[i], r] + w * (table[last, row[i], r] - table[k, row[i], r])
+        group, lane = 0 if slope.shape[0] == 1 else f // LANES, f % LANES
+        s, x = scale[f] * slope[group, step[n], lane], skew[group, step[n], lane]
+        norm = np.sqrt(1.0 + s * s + x * x)
+        for r in range(3):
+            work[r] = (frame[f, r, 0] + s * frame[f, r, 1] + x * frame[f, r, 2]) / norm
+        for r in range(3):
+            D[r] = R[p, r, 0] * work[0] + R[p, r, 1] * work[1] + R[p, r, 2] * work[2]
+        for r in range(3):
+            o[r], d[r] = 0.0, 0.0
+            for c in range(3):
+                o[r] += at[3 * c + r] * (origin[p, c] - at[9 + c])
+                d[r] += at[3 * c + r] * D[c]
+        out[n] = _hit(kind[i], small, o, d, work) <= limit[n]
+
+
 @jit
 def _cast_fans(  # type: ignore[no-untyped-def]
     kind, size, bound, row, still, table, path, key, weight, R, origin, pose_of, frame, slope, skew,
     scale, first_step, last_step, low, bins_per_slope, slack, skew_max, out_at, out_stride, start, stop,
-    begin, end, out_range, out_geom, out_cosine,
+    begin, end, onto, out_range, out_geom, out_cosine,
 ):  # fmt: skip
     """Rays [begin, end) of the fans [start, stop), four fans at a time; start and stop are multiples of four.
 
     out_* are flat: ray j of fan f goes to out_at[f] + j * out_stride, that of padding (NOWHERE) is left out.
+    With `onto` they hold hits already, and a ray keeps its own unless another geom than that is nearer.
     """
     geoms, bins = kind.shape[0], first_step.shape[1]
     alike = slope.shape[0] == 1  # all fans have the same slopes but for their scale
@@ -830,7 +980,10 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     R[p, r, 0] * frame[f, 0, c] + R[p, r, 1] * frame[f, 1, c] + R[p, r, 2] * frame[f, 2, c]
                 )
     best, facing = np.empty((end, LANES)), np.empty((end, LANES))
-    who = np.empty((end, LANES), np.int32)
+    who, own = np.empty((end, LANES), np.int32), np.empty((end, LANES), np.int32)
+    kept = end if onto else 0
+    kept_best, kept_facing = np.empty((kept, LANES)), np.empty((kept, LANES))
+    kept_who = np.empty((kept, LANES), np.int32)
     G, C, M, o, X = (
         np.empty((9, LANES)), np.empty((3, LANES)), np.empty((9, LANES)), np.empty((3, LANES)),
         np.empty((3, LANES)),
@@ -856,6 +1009,12 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     fan, fan + LANES, kind, size, bound, row, still, table, path, key, weight, origin,
                     pose_of, W, least - slack, most + slack, skew_max + slack, close, some, plane, here,
                 )  # fmt: skip
+                if few + flat == 0:
+                    if not onto:
+                        _nothing(
+                            out_at[fan : fan + LANES], begin, end, out_stride, out_range, out_geom, out_cosine
+                        )
+                    continue
                 table_of = 0 if alike else group
                 narrowest = min(scale[fan], scale[fan + 1], scale[fan + 2], scale[fan + 3])
                 widest = max(scale[fan], scale[fan + 1], scale[fan + 2], scale[fan + 3])
@@ -870,6 +1029,17 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                 for j in range(begin, end):
                     for lane in range(LANES):
                         best[j, lane], who[j, lane], facing[j, lane] = np.inf, -1, 0.0
+                own0, own1 = end, begin  # between which steps there are hits already
+                if onto:
+                    _start_from(
+                        out_at[fan : fan + LANES], begin, end, out_stride, out_range, out_geom, out_cosine,
+                        s, x, best, who, facing,
+                    )  # fmt: skip
+                    for j in range(begin, end):
+                        for lane in range(LANES):
+                            own[j, lane] = who[j, lane]
+                            if who[j, lane] >= 0:
+                                own0, own1 = min(own0, j), j + 1
                 for m in range(flat):
                     i = planes[m]
                     if row[i] < 0:
@@ -878,7 +1048,10 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         _frames_of(row[i], table, key4, weight4, G, C)
                         _lanes(G, C, P4, W4, M, o, X)
                     j0, j1 = _steps_down(M, s, skew_max + slack, begin, end)
+                    k0, k1 = max(j0, own0), min(j1, own1)
+                    _copy(k0, k1, best, who, facing, kept_best, kept_who, kept_facing)
                     _fans_plane(size[i], M, o, s, x, j0, j1, i, best, who, facing)
+                    _put_back(own, i, k0, k1, kept_best, kept_who, kept_facing, best, who, facing)
                 for m in range(few):
                     i = here[m]
                     if row[i] < 0:
@@ -907,6 +1080,8 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         continue
                     j0 = max(first_step[table_of, int(max(b0, 0.0))], begin)
                     j1 = min(last_step[table_of, int(min(b1, bins - 1.0))], end)
+                    k0, k1 = max(j0, own0), min(j1, own1)
+                    _copy(k0, k1, best, who, facing, kept_best, kept_who, kept_facing)
                     for lane in range(LANES):
                         x0, y0, z0 = o[0, lane], o[1, lane], o[2, lane]
                         if x0 * x0 + y0 * y0 + z0 * z0 > 1.01 * bound[i] * bound[i] + 1e-6:
@@ -915,20 +1090,8 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                             _lane_from_inside(
                                 kind[i], size[i], M, o, s, x, lane, begin, end, i, best, who, facing, work
                             )
-                    if kind[i] == BOX:
-                        _fans_box(size[i], M, o, s, x, j0, j1, i, best, who, facing)
-                    elif kind[i] == CAPSULE:
-                        _fans_capsule(size[i], M, o, s, x, j0, j1, i, best, who, facing)
-                    elif kind[i] == CYLINDER:
-                        _fans_cylinder(size[i], M, o, s, x, j0, j1, i, best, who, facing)
-                    elif kind[i] == ELLIPSOID:
-                        _fans_ellipsoid(
-                            size[i, 0], size[i, 1], size[i, 2], M, o, s, x, j0, j1, i, best, who, facing
-                        )
-                    else:
-                        _fans_ellipsoid(
-                            size[i, 0], size[i, 0], size[i, 0], M, o, s, x, j0, j1, i, best, who, facing
-                        )
+                    _fans_solid(kind[i], size[i], M, o, s, x, j0, j1, i, best, who, facing)
+                    _put_back(own, i, k0, k1, kept_best, kept_who, kept_facing, best, who, facing)
                 _finish(s, x, begin, end, best, facing)
                 for lane in range(LANES):
                     at = out_at[fan + lane]

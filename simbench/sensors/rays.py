@@ -1,9 +1,9 @@
 """Ray casting in time: nearest hits on MuJoCo's primitive geoms, every ray at its own instant.
 
-`cast` takes groups of any rays (a group shares an origin and an instant), `cast_pixels` the pixels of one
-camera. `cast_fans` is the fast way for sensors that look along planes: the columns of a spinning LiDAR, the
-rows of a camera. All are analytic in float64. Inside starts return the exit, planes are hit from above only:
-as `mj_ray` does, which is the oracle in the tests (ranges equal to 1e-9 m).
+`cast` takes groups of any rays (a group shares an origin and an instant). `cast_fans` is the fast way for
+sensors that look along planes: the columns of a spinning LiDAR, the rows of a camera. All are analytic in
+float64. Inside starts return the exit, planes are hit from above only: as `mj_ray` does, which is the oracle
+in the tests (ranges equal to 1e-9 m).
 """
 
 from __future__ import annotations
@@ -92,42 +92,6 @@ def cast(
         np.ascontiguousarray(time_index, dtype=np.int64),
         np.ascontiguousarray(origin_m, dtype=np.float64),
         np.ascontiguousarray(direction, dtype=np.float64),
-        range_m,
-        geom,
-        cosine,
-    )
-    return Hits(range_m=range_m, geom=geom, cosine=cosine)
-
-
-def cast_pixels(
-    geoms: Geoms,
-    wanted: Bool[np.ndarray, " g"],
-    body_rotation: Float64[np.ndarray, "b 3 3"],
-    body_position_m: Float64[np.ndarray, "b 3"],
-    R_world_camera: Float64[np.ndarray, "3 3"],
-    camera_position_m: Float64[np.ndarray, " 3"],
-    x: Float64[np.ndarray, " c"],
-    y: Float64[np.ndarray, " r"],
-) -> Hits:
-    """Nearest hits [c r] of the pixel rays (x, y, 1) of one camera at one instant, among the geoms in
-    `wanted`."""
-    shape = (len(x), len(y))
-    range_m, geom = np.empty(shape), np.empty(shape, dtype=np.int32)
-    cosine = np.empty(shape, dtype=np.float32)
-    kernel._cast_pixels(
-        geoms.kind,
-        geoms.size_m,
-        geoms.body,
-        geoms.rotation,
-        geoms.position_m,
-        geoms.bound_m,
-        wanted,
-        np.ascontiguousarray(body_rotation),
-        np.ascontiguousarray(body_position_m),
-        np.ascontiguousarray(R_world_camera),
-        np.ascontiguousarray(camera_position_m),
-        np.ascontiguousarray(x, dtype=np.float64),
-        np.ascontiguousarray(y, dtype=np.float64),
         range_m,
         geom,
         cosine,
@@ -281,8 +245,12 @@ def cast_fans(
     out: Hits,
     slope: Float64[np.ndarray, "g k l"] | None = None,
     skew: Float64[np.ndarray, "g k l"] | None = None,
+    onto: bool = False,
 ) -> None:
     """Nearest hit of every ray of the fans, into `out` (its arrays seen as flat).
+
+    `onto`: `out` holds hits already (geom -1: a limit of the range), and a ray keeps its own unless another
+    geom than that is nearer.
 
     Pose i of the sensor is R_world_sensor[i], origin_m[i], at the instant between keys key[i] and key[i] + 1
     of `placed`, `weight[i]` of the way. `slope`, `skew`: packed as the fans', within their slack of them.
@@ -317,6 +285,7 @@ def cast_fans(
         len(fans.pose),
         0,
         fans.slope.shape[1],
+        onto,
         out.range_m.reshape(-1),
         out.geom.reshape(-1),
         out.cosine.reshape(-1),
@@ -333,27 +302,76 @@ def cast_window(
     fans: Fans,
     pose: Int64[np.ndarray, " f"],
     window: tuple[int, int, int, int],
-) -> Int32[np.ndarray, "r c"]:
-    """The geom that rays of a part of the fans meet first, among the geoms `wanted`; -1: none.
+) -> Hits:
+    """What rays [r c] of a part of the fans meet first, among the geoms `wanted`.
 
     window: (first ray, first fan, last ray, last fan), the last ones not in it. pose: of each fan, in place
-    of `fans.pose`; the rest as for `cast_fans`.
+    of `fans.pose`; the rest is as for `cast_fans`.
     """
     geoms, (begin, top, end, bottom) = placed.geoms, window
     start, stop = top - top % LANES, min(bottom + (-bottom) % LANES, len(fans.pose))
-    width = end - begin
-    found = np.empty((stop - start, width), dtype=np.int32)
-    range_m, cosine = np.empty(found.size), np.empty(found.size, dtype=np.float32)
-    out_at = width * (np.arange(len(fans.pose)) - start) - begin
+    hits = empty_hits((bottom - top, end - begin))
+    out_at = np.full(len(fans.pose), NOWHERE)
+    out_at[top:bottom] = (end - begin) * np.arange(bottom - top) - begin
     kernel._cast_fans(
         geoms.kind[wanted], geoms.size_m[wanted], geoms.bound_m[wanted], placed.row[wanted],
         placed.still[wanted], placed.keys, placed.path_m, key, weight,
         np.ascontiguousarray(R_world_sensor), np.ascontiguousarray(origin_m), pose, fans.frame, fans.slope,
         fans.skew, fans.scale, fans.first_step, fans.last_step, fans.low, fans.bins_per_slope, fans.slack,
-        fans.skew_max, out_at, 1, start, stop, begin, end, range_m, found.reshape(-1), cosine,
+        fans.skew_max, out_at, 1, start, stop, begin, end, False,
+        hits.range_m.reshape(-1), hits.geom.reshape(-1), hits.cosine.reshape(-1),
     )  # fmt: skip
-    named = np.append(wanted, -1).astype(np.int32)
-    return named[found[top - start : bottom - start]]
+    named = np.append(wanted, -1).astype(np.int32)[hits.geom]
+    return Hits(range_m=hits.range_m, geom=named, cosine=hits.cosine)
+
+
+def hiders(
+    placed: Placed,
+    geom: Int[np.ndarray, " n"],
+    eye_m: Float64[np.ndarray, " 3"],
+    R_world_view: Float64[np.ndarray, "3 3"],
+    slopes: tuple[float, float, float, float],
+) -> Int64[np.ndarray, " m"]:
+    """Other geoms that may stand before one of the geoms `geom` at the first key, seen from eye_m in a part
+    (x0, y0, x1, y1: slopes x / z, y / z) of a view's optical frame.
+
+    Leaves out none that does, but the ground before what has sunk into it by less than a millimetre.
+    """
+    geoms = placed.geoms
+    out, mask = np.empty(len(geoms.kind), dtype=np.int64), np.zeros(len(geoms.kind), dtype=np.bool_)
+    mask[geom] = True
+    count = kernel._hiders(
+        geoms.kind, geoms.size_m, placed.still, mask, eye_m, np.ascontiguousarray(R_world_view),
+        np.array(slopes), out,
+    )  # fmt: skip
+    return out[:count]
+
+
+def filled(
+    placed: Placed,
+    key: Int64[np.ndarray, " p"],
+    weight: Float64[np.ndarray, " p"],
+    R_world_sensor: Float64[np.ndarray, "p 3 3"],
+    origin_m: Float64[np.ndarray, "p 3"],
+    fans: Fans,
+    fan: Int64[np.ndarray, " n"],
+    step: Int64[np.ndarray, " n"],
+    geom: Int32[np.ndarray, " n"],
+    widening: float,
+    limit_m: Float64[np.ndarray, " n"],
+) -> Bool[np.ndarray, " n"]:
+    """Whether a geom surely fills the cone about one ray of the fans: all of the cone, whose radius is
+    `widening` times the distance, is inside it somewhere nearer than limit_m.
+
+    The rest is as for `cast_fans`. Never True wrongly; maybe False for a geom that just fills the cone.
+    """
+    found = np.empty(len(fan), dtype=np.bool_)
+    kernel._filled(
+        placed.geoms.kind, placed.geoms.size_m, placed.row, placed.still, placed.keys, key, weight,
+        R_world_sensor, origin_m, fans.pose, fans.frame, fans.slope, fans.skew, fans.scale, fan, step, geom,
+        widening, limit_m, found,
+    )  # fmt: skip
+    return found
 
 
 def empty_hits(shape: tuple[int, ...]) -> Hits:

@@ -16,6 +16,7 @@ from scenarios.scenario import LidarSensor
 from simbench.sensors import rays
 from simbench.sensors.beams import BeamTable
 from simbench.sensors.compiled import jit
+from simbench.sensors.noise import standard_normal
 
 SOFT_EDGE = 0.04  # relative width of the logistic fall of detection probability at R(rho) [judgement]
 MAX_FALSE_RANGE_M = 100.0
@@ -69,7 +70,7 @@ class Points:
 def draw(sensor: LidarSensor, rng: np.random.Generator) -> Draws:
     """Draw everything. Dropout has a stream of its own, so that it moves no other number."""
     shape = (sensor.columns, len(sensor.elevation_deg))
-    normal = rng.standard_normal((3, *shape), dtype=np.float32)
+    normal = standard_normal(rng, (3, *shape))
     uniform = rng.random((3, *shape), dtype=np.float32)
     dropout = uniform[0]  # looked at only where the rate is above 0
     if sensor.dropout_rate > 0.0:
@@ -201,15 +202,16 @@ def _deliver(  # type: ignore[no-untyped-def]
             upright = np.float32(0.0)
             if geom[g, k] >= 0 and not dropout[c, b] < dropout_rate:
                 distance, back = range_m[g, k], reflectivity[g, k]
-                log_reach = log_reach_at_10 + exponent * np.log(max(back, 1e-6) / 0.1)
+                log_distance = float(np.log(np.float32(max(distance, 0.1))))
+                log_reach = log_reach_at_10 + exponent * float(np.log(np.float32(max(back, 1e-6) * 10.0)))
                 seen = True
                 if law:
-                    log_share = np.log(max(distance, 0.1)) - log_reach
+                    log_share = log_distance - log_reach
                     if log_share > LOG_SURE:
                         excess = (np.exp(log_share) - 1.0) / SOFT_EDGE
                         seen = detection[c, b] < 1.0 / (1.0 + np.exp(min(excess, 60.0)))
                 if seen:
-                    level = 2.0 * (log_reach - np.log(max(distance, 0.1)))
+                    level = 2.0 * (log_reach - log_distance)
                     if level <= strengths[0]:
                         spread = sd[0]
                     elif level < strengths[1]:

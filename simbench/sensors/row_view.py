@@ -110,17 +110,16 @@ class RowView(View):
         shown: np.ndarray = inside.any(axis=0)
         return shown
 
-    def outline(self, mask: Bool[np.ndarray, " g"]) -> BoxPx | None:
+    def outline(self, geom: Int[np.ndarray, " n"]) -> BoxPx | None:
         """As `View.outline`, each point of it at the time of its row."""
         width, height = float(self.camera.width_px), float(self.camera.height_px)
-        if (self._centre_m[:, mask, 2] + self.geoms.bound_m[mask]).max() < NEAR_M:
+        if (self._centre_m[:, geom, 2] + self.geoms.bound_m[geom]).max() < NEAR_M:
             return None
-        which = np.flatnonzero(mask)
-        instants = self._instants(*self._spanned(which))
-        frames = [self._frames(row, which) for row in instants]
+        instants = self._instants(*self._spanned(geom))
+        frames = [self._frames(row, geom) for row in instants]
         points = rim_points(
-            self.geoms.kind[which],
-            self.geoms.size_m[which],
+            self.geoms.kind[geom],
+            self.geoms.size_m[geom],
             np.stack([rotation for rotation, _ in frames]),
             np.stack([centre for _, centre in frames]),
             STATIONS if self._bent else 2,
@@ -143,12 +142,22 @@ class RowView(View):
         flat = np.concatenate([slope, np.ones((*slope.shape[:2], 1))], axis=-1).reshape(-1, 3)
         return self.camera.project(flat).reshape(slope.shape)
 
-    def cast(self, window: Window, mask: Bool[np.ndarray, " g"]) -> Int[np.ndarray, "r c"]:
+    def hiders(self, window: Window, geom: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+        """As `View.hiders`, at any instant of the read-out: by bounding spheres. The ground hides nothing."""
+        reach = self.geoms.bound_m + self._slack_m
+        distance = np.linalg.norm(self._centre_m, axis=2)
+        farthest_m = (distance + reach)[:, geom].max()
+        near = np.isfinite(reach) & (distance - reach < farthest_m).any(axis=0)
+        near[geom] = False
+        others = np.flatnonzero(near)
+        return others[self.may_show(others, self.geoms.bound_m[others])]
+
+    def cast(self, window: Window, geom: Int[np.ndarray, " n"]) -> rays.Hits:
         """As `View.cast`, each row at its own time."""
         seen, fans = self.exposure, row_fans(self.camera)
         return rays.cast_window(
-            seen.placed, np.flatnonzero(mask), seen.key, seen.weight, seen.R_world_camera, seen.origin_m,
-            fans, fans.pose, window,
+            seen.placed, geom, seen.key, seen.weight, seen.R_world_camera, seen.origin_m, fans, fans.pose,
+            window,
         )  # fmt: skip
 
 

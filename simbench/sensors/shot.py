@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float32, Float64, Int64
+from jaxtyping import Bool, Float32, Float64, Int32, Int64
 
+from fusion.geometry import readonly
 from simbench.motion import Motion
 from simbench.sensors import rays
 from simbench.sensors.beams import BeamTable
@@ -39,12 +41,32 @@ class Shot:
     fans: rays.Fans
     width: int
 
-    def cast(self, geoms: rays.Geoms | None = None) -> rays.Hits:
-        """Nearest hits [g k] of all middle rays, in the world or among other shapes at the same places."""
-        placed = self.placed if geoms is None else replace(self.placed, geoms=geoms)
+    def cast(self) -> rays.Hits:
+        """Nearest hits [g k] of all middle rays."""
         hits = rays.empty_hits((len(self.instant_ns), self.width))
-        rays.cast_fans(placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, hits)
+        rays.cast_fans(self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, hits)
         return hits
+
+    def cast_onto(self, hits: rays.Hits, geoms: rays.Geoms) -> None:
+        """Among other shapes at the same places: what replaces `hits` goes there; see `rays.cast_fans`."""
+        rays.cast_fans(
+            replace(self.placed, geoms=geoms), self.key, self.weight, self.rotation, self.origin_m, self.fans,
+            hits, onto=True,
+        )  # fmt: skip
+
+    def filled(
+        self,
+        group: Int64[np.ndarray, " n"],
+        place: Int64[np.ndarray, " n"],
+        geom: Int32[np.ndarray, " n"],
+        widening: float,
+        limit_m: Float64[np.ndarray, " n"],
+    ) -> Bool[np.ndarray, " n"]:
+        """Which of some middle rays' cones one geom fills nearer than a limit; see `rays.filled`."""
+        return rays.filled(
+            self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, group, place, geom,
+            widening, limit_m,
+        )  # fmt: skip
 
     def cast_beside(
         self,
@@ -86,6 +108,33 @@ class Shot:
         return hits
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Course:
+    """Where the sensor is at every group's instant of a sweep (T_world_lidar), and all bodies at its keys."""
+
+    rotation: Float64[np.ndarray, "g 3 3"]
+    origin_m: Float64[np.ndarray, "g 3"]
+    body_rotation: Float64[np.ndarray, "t b 3 3"]
+    body_position_m: Float64[np.ndarray, "t b 3"]
+
+
+def courses(
+    name: str, motion: Motion, table: BeamTable, start_ns: Int64[np.ndarray, " n"]
+) -> tuple[Course, ...]:
+    """Those of several sweeps of sensor `name` that start at true times start_ns: quicker than one by one."""
+    key_ns, instants = _keys(table)[0], table.group_offset_ns
+    rotation, origin = motion.sensor(name, (start_ns[:, None] + instants).ravel())
+    body_rotation, body_position = motion.poses((start_ns[:, None] + key_ns).ravel())
+    sweeps = len(start_ns)
+    return tuple(
+        Course(rotation=a, origin_m=b, body_rotation=c, body_position_m=d)
+        for a, b, c, d in zip(
+            rotation.reshape(sweeps, -1, 3, 3), origin.reshape(sweeps, -1, 3),
+            np.split(body_rotation, sweeps), np.split(body_position, sweeps), strict=True,
+        )
+    )  # fmt: skip
+
+
 def aim(
     name: str,
     motion: Motion,
@@ -94,13 +143,13 @@ def aim(
     azimuth_error: Float32[np.ndarray, "c b"],
     elevation_error: Float32[np.ndarray, "c b"],
     sd_rad: float,
+    course: Course | None = None,
 ) -> Shot:
     """Sensor `name` starts a sweep at true time `start_ns`; its beams are off by `sd_rad` times the two
-    errors, to first order."""
-    instant_ns = start_ns + table.group_offset_ns
-    rotation, origin = motion.sensor(name, instant_ns)
-    key_ns, key, weight = _keys(table)
-    body_rotation, body_position = motion.poses(start_ns + key_ns)
+    errors, to first order. course: that of this sweep, where it is known already."""
+    if course is None:
+        course = courses(name, motion, table, np.array([start_ns]))[0]
+    _, key, weight = _keys(table)
     fans = table.fans
     if sd_rad > 0.0:
         slope, skew = fans.slope.copy(), fans.skew.copy()
@@ -111,12 +160,12 @@ def aim(
         fans = replace(fans, slope=slope, skew=skew, slack=slack)
     return Shot(
         world=motion.world,
-        placed=rays.place(motion.world.geoms, body_rotation, body_position),
-        instant_ns=instant_ns,
-        rotation=rotation,
-        origin_m=origin,
-        body_rotation=body_rotation,
-        body_position_m=body_position,
+        placed=rays.place(motion.world.geoms, course.body_rotation, course.body_position_m),
+        instant_ns=start_ns + table.group_offset_ns,
+        rotation=course.rotation,
+        origin_m=course.origin_m,
+        body_rotation=course.body_rotation,
+        body_position_m=course.body_position_m,
         key=key,
         weight=weight,
         fans=fans,
@@ -124,6 +173,7 @@ def aim(
     )
 
 
+@lru_cache(maxsize=8)
 def _keys(
     table: BeamTable,
 ) -> tuple[Int64[np.ndarray, " t"], Int64[np.ndarray, " g"], Float64[np.ndarray, " g"]]:
@@ -135,7 +185,7 @@ def _keys(
         key_ns = np.append(key_ns, fire_ns[-1])
     key = np.searchsorted(key_ns, fire_ns, side="right") - 1
     step_ns = np.append(np.diff(key_ns), 1)
-    return key_ns, key, (fire_ns - key_ns[key]) / step_ns[key]
+    return readonly(key_ns), readonly(key), readonly((fire_ns - key_ns[key]) / step_ns[key])
 
 
 @jit

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fusion.camera import PinholeCamera
 from fusion.messages import LidarScan
@@ -50,23 +50,26 @@ class Session:
 def set_up(
     effects: bool, image_px: tuple[int, int] | None = None, duration_s: float | None = None
 ) -> Session:
-    """The catalogue's drive, or one of another duration; cameras in colour, with all effects or none.
-
-    The LiDAR is as its file says, with all of its own effects, either way.
-    """
+    """The catalogue's drive, or one of another duration; all sensors with all effects or none, cameras in
+    colour."""
     stage = drive_stage(duration_s, image_px)
     cameras = {
         name: sensor.model_copy(update={**PLAIN, **(EFFECTS if effects else {})})
         for name, sensor in stage.rig.cameras.items()
     }
     return Session(
-        rig=stage.rig,
+        rig=stage.rig if effects else plain_lidar(stage.rig),
         motion=still_motion(stage),
         cameras=cameras,
         pinholes={name: pinhole(sensor) for name, sensor in cameras.items()},
         timing={name: stage.rig.timing(name, stage.system.duration_s, SEED) for name in cameras},
         noisy=effects,
     )
+
+
+def plain_lidar(rig: SensorRig) -> SensorRig:
+    """The rig with a LiDAR of thin, exact beams: of its effects only how far it sees is left."""
+    return replace(rig, lidar=lidar.without(rig.lidar, *(e for e in lidar.EFFECTS if e not in lidar.LIMITS)))
 
 
 def drive_stage(duration_s: float | None = None, image_px: tuple[int, int] | None = None) -> Stage:

@@ -16,6 +16,7 @@ MEASURES: dict[str, Callable[[Size], Measured]] = {
     "cameras_vs_gl": camera_rows.cameras_vs_gl,
     "realtime_full_rig": lambda size: realtime_rows.full_rig(size, effects=False),
     "realtime_full_rig_all_effects": lambda size: realtime_rows.full_rig(size, effects=True),
-    "realtime_lidar_boxes": realtime_rows.lidar_boxes,
+    "realtime_lidar_boxes": lambda size: realtime_rows.lidar_boxes(size, effects=False),
+    "realtime_lidar_boxes_all_effects": lambda size: realtime_rows.lidar_boxes(size, effects=True),
     "peak_rss_mb_60s": realtime_rows.peak_rss,
 }

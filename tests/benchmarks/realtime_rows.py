@@ -23,10 +23,12 @@ class Drive:
     staged: Stage
 
 
-def set_up_drive(drive_s: float | None) -> Drive:
-    """The catalogue's drive, or its first `drive_s` seconds."""
+def set_up_drive(effects: bool, drive_s: float | None) -> Drive:
+    """The catalogue's drive, or its first `drive_s` seconds; the LiDAR with all effects or none."""
     job = Job(scenario=SCENARIO, system=SYSTEM, seed=SEED, pipelines=())
     staged = stage(job)
+    if not effects:
+        staged = replace(staged, rig=frames.plain_lidar(staged.rig))
     if drive_s is not None:
         staged = replace(staged, system=staged.system.model_copy(update={"duration_s": drive_s}))
     return Drive(job=job, staged=staged)
@@ -42,11 +44,11 @@ def record_drive(drive: Drive, seed: int) -> float:
     return float(drive.staged.system.duration_s)
 
 
-def lidar_boxes(size: Size) -> Measured:
+def lidar_boxes(size: Size, effects: bool) -> Measured:
     """`simbench.stage.record`: all that a case records but pictures; each worker its own drive."""
     windows = [(2 * i, 2 * i + 1) for i in range(size.windows + 1)]
     return measured(
-        rates(set_up_drive, (size.drive_s,), record_drive, windows, size.spawn),
+        rates(set_up_drive, (effects, size.drive_s), record_drive, windows, size.spawn),
         "lidar and boxes: each worker records its own drive",
     )
 

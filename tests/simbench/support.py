@@ -83,7 +83,7 @@ def posed(at: Stage, seed: int = 0) -> Captured:
     """A recording without points and boxes: all that receipts of time, motion and calibration look at."""
     with (
         mock.patch("simbench.capture.lidar.sweep", _no_returns),
-        mock.patch("simbench.capture._boxes_in", lambda *_: ()),
+        mock.patch("simbench.capture._Sought.boxes_in", lambda *_: ()),
     ):
         return recorded(at, seed)
 
@@ -107,7 +107,7 @@ def boxed(at: Stage, seed: int = 0) -> Captured:
     replay = iter(_BOXES[key][1])
     with (
         mock.patch("simbench.capture.lidar.sweep", _no_returns),
-        mock.patch("simbench.capture._boxes_in", lambda *_: next(replay)),
+        mock.patch("simbench.capture._Sought.boxes_in", lambda *_: next(replay)),
     ):
         return recorded(at, seed)
 
@@ -116,7 +116,7 @@ _BOXES: dict[tuple[int, float, int], tuple[object, list[tuple[TrueBox, ...]]]] =
 
 
 def _no_returns(
-    name: str, sensor: LidarSensor, motion: object, start_ns: int, seq: int, rng: object
+    name: str, sensor: LidarSensor, motion: object, start_ns: int, seq: int, rng: object, course: object
 ) -> tuple[LidarScan, ScanTruth]:
     scan = LidarScan(
         sensor=name,

@@ -84,7 +84,7 @@ def test_nothing_returned_scores_nothing(cases: dict[str, Case]) -> None:
 def test_one_point_per_object_has_a_high_tpr_and_no_recall(cases: dict[str, Case]) -> None:
     assert value(cases["OnePoint"], "tpr") > 0.95
     assert value(cases["OnePoint"], "recall") < 0.1
-    assert value(cases["OnePoint"], "coverage@5points") < 0.1
+    assert value(cases["OnePoint"], "coverage@5points") < 0.2  # far off, where the target has five points
 
 
 def test_one_frame_only_fails_in_coverage(cases: dict[str, Case]) -> None:
@@ -289,7 +289,7 @@ def test_intensity_does_not_tell_the_target_from_other_objects_with_boxes(system
 
 
 def _scans(at: Stage, seed: int) -> tuple[Truth, list[LidarScan]]:
-    with mock.patch("simbench.capture._boxes_in", lambda *_: ()):
+    with mock.patch("simbench.capture._Sought.boxes_in", lambda *_: ()):
         recording = recorded(at, seed).recording
     return recording.truth, [m for m in recording.messages if isinstance(m, LidarScan)]
 

@@ -85,7 +85,10 @@ def test_what_reaches_behind_the_camera_has_no_outline(kind: int) -> None:
 # -- views ------------------------------------------------------------------------------------------------
 
 
-def view_of(shapes: list[tuple[int, tuple[float, float, float], tuple[float, float, float]]]) -> View:
+Shape = tuple[int, tuple[float, float, float], tuple[float, float, float]]
+
+
+def view_of(shapes: list[Shape]) -> View:
     """Shapes in front of a camera at the origin that looks along x: (kind, size, centre)."""
     geoms = rays.Geoms(
         kind=np.array([s[0] for s in shapes]),
@@ -100,7 +103,7 @@ def view_of(shapes: list[tuple[int, tuple[float, float, float], tuple[float, flo
 
 
 BEHIND = (rays.BOX, (0.1, 1.0, 1.0), (10.0, 0.0, 0.0))
-ONLY_FIRST = np.array([True, False])
+ONLY_FIRST = np.array([0])
 
 
 def test_half_hidden_by_a_wall_the_visible_box_ends_at_the_wall() -> None:
@@ -182,47 +185,87 @@ def test_boxes_are_the_extent_of_rays_through_every_pixel(scene: Stage, name: st
     R, p = motion.poses(t_ns)
     view = View(world.geoms, R[0], p[0], at(motion.sensor(name, t_ns)), scene.rig.pinholes[name])
     whole = (0, 0, 960, 600)
-    everything = view.cast(whole, np.ones(len(world.geoms.kind), dtype=bool))
+    everything = view.cast(whole, np.arange(len(world.geoms.kind))).geom
     owner = np.where(everything >= 0, world.geom_object[everything], -1)
     compared = 0
     for info in world.objects:
         mask = world.masks[info.object_id]
-        box = true_box(view, info.object_id, mask, 4.0)
+        box = true_box(view, info.object_id, np.flatnonzero(mask), 4.0)
         rows, columns = np.nonzero(owner == info.object_id)
         if box is None or box.visible_px is None:
             assert len(rows) < 40
             continue
         extent = (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1)
-        assert box.visible_px == tuple(float(e) for e in extent), info.name
-        alone = np.argwhere(view.cast(whole, mask) >= 0)[:, ::-1]
+        alone = np.argwhere(view.cast(whole, np.flatnonzero(mask)).geom >= 0)[:, ::-1]
+        assert box.visible_fraction == len(rows) / len(alone), info.name
+        assert box.visible_px == (tuple(map(float, extent)) if len(rows) < len(alone) else box.amodal_px)
         extent = np.concatenate([alone.min(axis=0), alone.max(axis=0) + 1])
         assert np.mean(np.abs(extent - box.amodal_px) <= 1.0) == 1.0 or info.category in ("post", "tree")
         compared += 1
     assert compared >= 3
 
 
+def scattered(rng: np.random.Generator, count: int) -> list[Shape]:
+    return [
+        (
+            int(rng.choice(ROUND)),
+            tuple(rng.uniform(0.1, 1.0, 3).tolist()),
+            tuple(rng.uniform([-3, -8, -6], [25, 8, 6]).tolist()),
+        )
+        for _ in range(count)
+    ]
+
+
+def turned(view: View, rng: np.random.Generator) -> View:
+    rotation = rotation_rpy(*rng.uniform(-0.3, 0.3, 3)) @ R_BODY_OPTICAL
+    pose = Transform(rotation=rotation, translation_m=np.zeros(3))
+    return View(view.geoms, np.eye(3)[None], np.zeros((1, 3)), pose, CAMERA)
+
+
 @settings(max_examples=25)
 @given(seed=st.integers(0, 2**31))
 def test_a_window_of_pixels_is_cast_like_rays_one_by_one(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    shapes = [
-        (
-            int(rng.choice(ROUND)),
-            tuple(rng.uniform(0.1, 1.0, 3)),
-            tuple(rng.uniform([-3, -8, -6], [25, 8, 6])),
-        )
-        for _ in range(30)
-    ]
-    turned = Transform(
-        rotation=rotation_rpy(*rng.uniform(-0.3, 0.3, 3)) @ R_BODY_OPTICAL, translation_m=np.zeros(3)
-    )
-    plain = view_of(shapes)  # type: ignore[arg-type]
-    R, p = np.eye(3)[None], np.zeros((1, 3))
-    view = View(plain.geoms, R, p, turned, CAMERA)
+    view = turned(view_of(scattered(rng, 30)), rng)
     x0, y0 = (int(v) for v in rng.integers(0, [600, 440]))
     x1, y1 = (int(v) for v in rng.integers([x0 + 1, y0 + 1], [641, 481]))
-    mask = rng.random(30) < 0.7
+    some = np.flatnonzero(rng.random(30) < 0.7)
     x = (np.arange(x0, x1) + 0.5 - CAMERA.cx_px) / CAMERA.fx_px
     y = (np.arange(y0, y1) + 0.5 - CAMERA.cy_px) / CAMERA.fy_px
-    slow = rays.cast_pixels(plain.geoms, mask, R, p, turned.rotation, turned.translation_m, x, y)
-    assert np.array_equal(view.cast((x0, y0, x1, y1), mask), slow.geom.T)
+    grid = np.stack(np.broadcast_arrays(x, y[:, None], 1.0), axis=-1) @ view.T_world_camera.rotation.T
+    grid /= np.linalg.norm(grid, axis=-1, keepdims=True)
+    names = ("kind", "size_m", "body", "rotation", "position_m", "bound_m")
+    slow = rays.cast(
+        rays.Geoms(**{name: getattr(view.geoms, name)[some] for name in names}),
+        np.eye(3)[None, None], np.zeros((1, 1, 3)), np.zeros(len(y), np.int64), np.zeros((len(y), 3)), grid,
+    )  # fmt: skip
+    found = view.cast((x0, y0, x1, y1), some)
+    assert np.array_equal(found.geom, np.append(some, -1)[slow.geom])
+    np.testing.assert_allclose(found.range_m, slow.range_m, rtol=1e-9)
+
+
+@settings(max_examples=60, deadline=None)
+@given(seed=st.integers(0, 2**31), ground=st.booleans(), own=st.integers(1, 4), others=st.integers(0, 12))
+def test_nothing_that_hides_an_object_is_overlooked(seed: int, ground: bool, own: int, others: int) -> None:
+    """Fractions and boxes against every pixel of the whole image, among all geoms."""
+    rng = np.random.default_rng(seed)
+    shapes = scattered(rng, own + others)
+    if ground:
+        shapes.append((rays.PLANE, (0.0, 0.0, 1.0), (0.0, 0.0, float(rng.uniform(-6.0, -0.5)))))
+    view = turned(view_of(shapes), rng)
+    box = true_box(view, 0, np.arange(own), 4.0)
+    whole = (0, 0, CAMERA.width_px, CAMERA.height_px)
+    alone = view.cast(whole, np.arange(own)).geom >= 0
+    first = view.cast(whole, np.arange(len(shapes))).geom
+    seen = (first >= 0) & (first < own)
+    if box is None:
+        assert alone.sum() == 0 or np.flatnonzero(alone.any(axis=1)).size <= 4
+        return
+    assert box.visible_fraction == seen.sum() / alone.sum()
+    rows, columns = np.nonzero(seen)
+    if len(rows) == 0:
+        assert box.visible_px is None
+        return
+    extent = np.array([columns.min(), rows.min(), columns.max() + 1, rows.max() + 1])
+    assert box.visible_px is not None
+    assert np.abs(extent - box.visible_px).max() <= (1.5 if box.visible_fraction == 1.0 else 0.0)

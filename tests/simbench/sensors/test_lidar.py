@@ -427,6 +427,18 @@ def test_the_noise_of_a_beam_does_not_depend_on_the_scene() -> None:
     assert np.array_equal(a.intensity[rows], b.intensity[others])
 
 
+def test_sweeps_taken_one_after_the_other_are_those_taken_alone(scene: Stage) -> None:
+    """More of them than have their poses found together."""
+    motion, sensor, count = shaken_motion(scene), os1(), lidar.AT_ONCE + 2
+    together = list(lidar.sweeps("lidar", sensor, motion, count, lambda seq: stream(1, "lidar", str(seq))))
+    assert [scan.seq for scan, _ in together] == list(range(count))
+    for seq in (0, lidar.AT_ONCE - 1, lidar.AT_ONCE + 1):
+        scan, truth = lidar.sweep("lidar", sensor, motion, seq * 100 * MS, seq, stream(1, "lidar", str(seq)))
+        assert np.array_equal(together[seq][0].xyz_m, scan.xyz_m)
+        assert np.array_equal(together[seq][1].true_range_m, truth.true_range_m)
+        assert together[seq][0].stamp_ns == scan.stamp_ns
+
+
 def test_the_same_stream_gives_the_same_scan_to_the_bit(scene: Stage) -> None:
     motion = shaken_motion(scene)
     first, again = (lidar.sweep("lidar", os1(), motion, 0, 0, stream(1, "lidar", "0"))[0] for _ in range(2))

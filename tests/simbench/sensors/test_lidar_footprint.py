@@ -86,14 +86,8 @@ def test_the_samples_are_the_bell_on_a_hexagonal_grid() -> None:
     assert spacing[spacing > 0.0].min() == pytest.approx(1.0)
 
 
-def test_the_rim_encloses_every_sample() -> None:
-    """Outside none of the six lines through neighbouring rim samples."""
-    rim = footprint.SAMPLES[footprint.RIM]
-    rim = rim[np.argsort(np.arctan2(rim[:, 1], rim[:, 0]))]
-    assert len(rim) == 6
-    for a, b in zip(rim, np.roll(rim, -1, axis=0), strict=True):
-        side = (b - a)[0] * (footprint.SAMPLES - a)[:, 1] - (b - a)[1] * (footprint.SAMPLES - a)[:, 0]
-        assert (side > -1e-12).all()
+def test_no_sample_is_farther_out_than_the_footprints_radius() -> None:
+    assert np.hypot(*footprint.SAMPLES.T).max() == pytest.approx(footprint.RADIUS_SD)
 
 
 def test_half_the_weight_lies_within_the_full_width_at_half_maximum() -> None:
@@ -107,7 +101,7 @@ def test_half_the_weight_lies_within_the_full_width_at_half_maximum() -> None:
 
 
 @pytest.mark.parametrize("system", ["car", "wearable"])
-def test_nearly_every_footprint_over_an_edge_is_found_and_few_others_are_looked_at(system: str) -> None:
+def test_every_footprint_over_an_edge_is_found_and_not_too_many_others_are_looked_at(system: str) -> None:
     """Brute force as the oracle: all 19 rays of all beams."""
     motion = shaken_motion(staged("overtake-approach", system, 3))  # type: ignore[arg-type]
     sensor = os1()
@@ -119,9 +113,9 @@ def test_nearly_every_footprint_over_an_edge_is_found_and_few_others_are_looked_
         np.minimum(np.where(brute.geom >= 0, brute.range_m, np.inf), plain.range_m) < 200.0
     )  # no horizon
     assert 500 < straddles.sum() < 0.04 * straddles.size
-    assert edge.sum() < 1.6 * straddles.sum()
-    assert (straddles & edge).sum() >= 0.995 * straddles.sum()
-    same = (edge | ~straddles) & (plain.range_m < 200.0)
+    assert edge.sum() < 3.0 * straddles.sum()
+    assert edge[straddles].all()
+    same = plain.range_m < 200.0
     assert np.array_equal(found.geom[same], brute.geom[same])
     for name in ("range_m", "true_range_m", "cosine", "reflectivity"):
         np.testing.assert_allclose(getattr(found, name)[same], getattr(brute, name)[same], rtol=1e-6)
@@ -155,8 +149,7 @@ def test_edges_of_all_shapes_are_found_however_thin_they_are(kinds: list[int], s
     brute, _ = echoes_of(motion, sensor, everywhere=True)
     plain = shot_of(motion, sensor).cast()
     straddles = (brute.geom != plain.geom) | (brute.range_m != plain.range_m)
-    missed = straddles & ~edge
-    assert missed.sum() <= 0.01 * straddles.sum() + 1
+    assert edge[straddles].all()
 
 
 def test_a_wire_between_the_beams_is_seen_by_the_beams_beside_it() -> None:

@@ -153,21 +153,17 @@ def assert_equal_to_mujoco(scene: Scene, origin: np.ndarray, direction: np.ndarr
     same = ours.geom[sure] == geom[sure]
     np.testing.assert_allclose(ours.cosine[sure][same], cosine[sure][same], atol=2e-6)
     for g, j in np.argwhere(sure & (ours.geom != geom)):  # ids may differ where two surfaces coincide
-        only = np.zeros(len(scene.geoms.kind), dtype=bool)
-        only[geom[g, j]] = True
-        theirs = rays.cast_pixels(
-            scene.geoms, only, scene.body_rotation[0], scene.body_position[0],
-            looking_along(direction[g, j]), origin[g], np.zeros(1), np.zeros(1),
+        theirs = rays.cast(
+            subset(scene.geoms, geom[g : g + 1, j]), scene.body_rotation, scene.body_position,
+            np.zeros(1, np.int64), origin[g : g + 1], direction[g : g + 1, j : j + 1],
         )  # fmt: skip
         assert abs(theirs.range_m[0, 0] - ours.range_m[g, j]) < 1e-9
     return int(both.sum())
 
 
-def looking_along(direction: np.ndarray) -> np.ndarray:
-    """A rotation whose third column is the direction."""
-    x = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
-    x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(direction, x), direction], axis=1)
+def subset(geoms: rays.Geoms, which: np.ndarray) -> rays.Geoms:
+    names = ("kind", "size_m", "body", "rotation", "position_m", "bound_m")
+    return rays.Geoms(**{name: getattr(geoms, name)[which] for name in names})
 
 
 @settings(max_examples=60)
@@ -303,33 +299,6 @@ def test_each_column_sees_the_world_frozen_at_its_own_time() -> None:
         )  # fmt: skip
         assert np.array_equal(frozen.range_m[0], moving.range_m[g])
         assert np.array_equal(frozen.geom[0], moving.geom[g])
-
-
-@settings(max_examples=20)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_pixels_are_cast_like_any_other_ray(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    scene = make_scene([*KINDS, *KINDS, rays.PLANE], rng)
-    R_world_camera, position = random_rotation(rng), rng.uniform(-9.0, 9.0, 3)
-    x, y = np.linspace(-1.2, 1.1, 11), np.linspace(-0.7, 0.8, 9)
-    wanted = rng.random(11) < 0.7
-    pixels = rays.cast_pixels(
-        scene.geoms, wanted, scene.body_rotation[0], scene.body_position[0], R_world_camera, position, x, y
-    )
-    grid = np.stack(np.broadcast_arrays(x[:, None], y[None, :], 1.0), axis=-1)
-    direction = grid @ R_world_camera.T
-    direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
-    names = ("kind", "size_m", "body", "rotation", "position_m", "bound_m")
-    some = rays.Geoms(**{name: getattr(scene.geoms, name)[wanted] for name in names})
-    rest = rays.cast(
-        some, scene.body_rotation, scene.body_position, np.zeros(11, np.int64),
-        np.repeat(position[None], 11, 0),
-        direction,
-    )  # fmt: skip
-    hit = rest.geom >= 0
-    assert np.array_equal(hit, pixels.geom >= 0)
-    assert np.array_equal(np.flatnonzero(wanted)[rest.geom[hit]], pixels.geom[hit])
-    np.testing.assert_allclose(pixels.range_m[hit], rest.range_m[hit], rtol=1e-9)
 
 
 # -- closed forms -----------------------------------------------------------------------------------------

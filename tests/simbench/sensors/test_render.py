@@ -192,7 +192,10 @@ def shots() -> Iterator[list[Shot]]:
                     view = View(of.world.geoms, R[0], p[0], T, camera)
                     ids, depth = renderer.ids_and_depth(motion, int(t_ns[0]), T, camera)
                     boxes = tuple(
-                        (true_box(view, o.object_id, of.world.masks[o.object_id], 4.0), o.object_id)
+                        (
+                            true_box(view, o.object_id, np.flatnonzero(of.world.masks[o.object_id]), 4.0),
+                            o.object_id,
+                        )
                         for o in of.world.objects
                         if o.name != of.system.ego
                     )
@@ -214,7 +217,7 @@ def mask_extent(ids: np.ndarray, object_id: int) -> BoxPx | None:
 
 def test_ids_by_rays_equal_gls(shots: list[Shot]) -> None:
     for shot in shots:
-        geom = shot.view.cast((0, 0, 960, 600), np.ones(len(shot.of.world.geoms.kind), dtype=bool))
+        geom = shot.view.cast((0, 0, 960, 600), np.arange(len(shot.of.world.geoms.kind))).geom
         ours = np.where(geom >= 0, shot.of.world.geom_object[geom], GROUND)
         assert (ours == shot.ids).mean() >= 0.999
 
@@ -252,7 +255,7 @@ def test_visible_fraction_is_the_share_of_the_mask(shots: list[Shot]) -> None:
         for box, object_id in shot.boxes:
             if box is None or (box.amodal_px[3] - box.amodal_px[1]) < 40:
                 continue
-            own = shot.view.cast((0, 0, 960, 600), shot.of.world.masks[object_id]) >= 0
+            own = shot.view.cast((0, 0, 960, 600), np.flatnonzero(shot.of.world.masks[object_id])).geom >= 0
             share = (shot.ids == object_id).sum() / own.sum()
             assert box.visible_fraction == pytest.approx(share, abs=0.03)
 

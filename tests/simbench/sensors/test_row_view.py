@@ -42,8 +42,8 @@ def test_boxes_are_the_extent_of_the_id_mask(
     delay_ns: float,
     distortion: tuple[float, float, float, float, float],
 ) -> None:
-    """Visible boxes exactly; amodal ones of what nothing hides within a pixel. A tip thinner than a pixel may
-    fall between the pixels' centres: 1.5 px for one box in a hundred."""
+    """Those of what is hidden in part exactly; else within a pixel. A tip thinner than a pixel may fall
+    between the pixels' centres: 1.5 px for one box in a hundred."""
     of = staged(scenario, system, 2)
     motion, t_ns = shaken_motion(of), round(t_s * 1e9)
     lens = replace(of.rig.pinholes[name], distortion=distortion)
@@ -56,17 +56,18 @@ def test_boxes_are_the_extent_of_the_id_mask(
         if info.name == of.system.ego:
             continue
         rows, columns = np.nonzero(owner == info.object_id)
-        box = true_box(view, info.object_id, of.world.masks[info.object_id], 4.0)
+        box = true_box(view, info.object_id, np.flatnonzero(of.world.masks[info.object_id]), 4.0)
         if box is None or box.visible_px is None:
             assert len(rows) < 40
             continue
         reach_m = np.array([np.linalg.norm(info.size_m)])
         assert view.may_show(np.array([of.world.first_geom[info.object_id]]), reach_m).all()
         extent = np.array([columns.min(), rows.min(), columns.max() + 1, rows.max() + 1])
-        assert np.array_equal(extent, box.visible_px)
         compared += 1
         if box.visible_fraction == 1.0:
-            error.append(np.abs(extent - box.amodal_px))
+            error.append(np.abs(extent - box.visible_px))
+        else:
+            assert np.array_equal(extent, box.visible_px)
     assert compared >= 3
     if error:
         assert np.mean(np.array(error) <= 1.0) >= 0.97
@@ -83,11 +84,12 @@ def test_with_one_time_for_all_rows_the_boxes_are_those_of_one_instant() -> None
     compared = 0
     for info in of.world.objects:
         mask = of.world.masks[info.object_id]
-        a, b = (true_box(view, info.object_id, mask, 4.0) for view in (frozen, by_rows))
+        a, b = (true_box(view, info.object_id, np.flatnonzero(mask), 4.0) for view in (frozen, by_rows))
         assert (a is None) == (b is None)
         if a is None or b is None:
             continue
-        assert a.visible_px == b.visible_px
+        assert a.visible_px is not None
+        np.testing.assert_allclose(a.visible_px, np.array(b.visible_px, float), atol=0.6)
         assert a.visible_fraction == pytest.approx(b.visible_fraction, abs=0.05)
         np.testing.assert_allclose(a.amodal_px, b.amodal_px, atol=0.6)
         compared += 1
