@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from scenarios.categories import rough_size_m
 from scenarios.equipment import load_rig, rig_sensors
-from scenarios.errors import Where
+from scenarios.errors import Where, nearest
 from scenarios.fault_set import FaultSet
 from scenarios.library import find
+from scenarios.palette import materials_of, palette
 
 if TYPE_CHECKING:
     from scenarios.scenario import Actor, Scenario, System
@@ -36,6 +37,7 @@ def check_scenario(
         here = where.at("systems", name)
         for actor_name, actor in system.actors.items():
             find("part", actor.part, here.at("actors", actor_name, "part"))
+            _check_materials(actor, here.at("actors", actor_name, "materials"))
         cameras |= dict.fromkeys(_check_rig(system, here, beside, note))
         _check_actors_stand_apart(system, here, note)
     faults.check(tuple(cameras), where.at("faults"))
@@ -51,6 +53,15 @@ def _check_rig(system: System, where: Where, beside: Path | None, note: str) -> 
             ("duration_s",),
         )
     return (name for name, sensor in sensors.items() if sensor.kind == "camera")
+
+
+def _check_materials(actor: Actor, where: Where) -> None:
+    """Only what is drawn for each part may be given; what the whole scene shares is nobody's own."""
+    own = [name for name in materials_of(actor.part) if palette()[name]["per"] == "instance"]
+    for name in actor.materials or {}:
+        if name not in own:
+            problem = f"the part '{actor.part}' has no material '{name}' of its own"
+            raise where.error(problem, (name,), allowed=", ".join(sorted(own)), hint=nearest(name, own))
 
 
 def _check_area_leaves_lanes(scenario: Scenario, index: int, where: Where, note: str) -> None:
@@ -77,6 +88,9 @@ def start_box(actor: Actor) -> Box:
     """Where an actor starts, and its footprint by its category's size."""
     (x, y), *rest = actor.path.waypoints_m
     heading = atan2(rest[0][1] - y, rest[0][0] - x) if rest else radians(actor.path.heading_deg)
+    if (sway := actor.path.sway) is not None:
+        left = sway.amplitude_m * sin(radians(sway.phase_deg))
+        x, y = x - left * sin(heading), y + left * cos(heading)
     length, width, _ = rough_size_m(actor.category)
     return x, y, heading, length * actor.scale, width * actor.scale
 

@@ -6,6 +6,7 @@ wherever a number stands; `load.py` draws it by seed before these models see it.
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -16,7 +17,10 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Drawn = NonNegative | tuple[NonNegative, NonNegative]  # a number, or low and high: drawn once a run
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]*$", max_length=64)]
+Share = Annotated[float, Field(ge=0, le=1)]
 Category = Literal["car", "rider", "pedestrian", "tree", "post", "building", "board"]
+INSIDE_BEND = 0.8
+"""Things on a road with a bend stay within this share of its radius from the centre line, on either side."""
 
 
 class Spec(BaseModel):
@@ -53,18 +57,32 @@ def check_drawn(value: float | tuple[float, float], field: str, most: float, wha
         raise broken(f"is more than {what}", field)
 
 
+def _is_absent(value: object) -> bool:
+    return value is None
+
+
+class Sway(Spec):
+    """To and fro across a path: amplitude_m * sin(2 pi frequency_hz t + phase_deg) to its left."""
+
+    amplitude_m: Annotated[float, Field(ge=0, le=2, allow_inf_nan=False)]
+    frequency_hz: Annotated[float, Field(gt=0, le=5, allow_inf_nan=False)]
+    phase_deg: Finite = 0.0
+
+
 class Path(Spec):
     """A drive over waypoints (world x east, y north) at a piecewise linear speed; heading follows the path.
 
     Two waypoints are a straight line, more are a C2 spline through them. Past either end the path goes on
     straight. With one waypoint the path is the straight line from it along `heading_deg` (0 = east,
     counter-clockwise), which is given then only. `speed_mps` is one number or points (time s, speed m/s).
-    At time 0 the actor is at the first waypoint.
+    At time 0 the actor is at the first waypoint, or beside it by its `sway`: heading and speed over ground
+    are those of the swaying motion, `speed_mps` is that along the path. On a road with a bend see `Bend`.
     """
 
     waypoints_m: tuple[tuple[Finite, Finite], ...] = Field(min_length=1)
     speed_mps: NonNegative | tuple[tuple[NonNegative, NonNegative], ...] = 0.0
     heading_deg: Finite = 0.0
+    sway: Sway | None = Field(default=None, exclude_if=_is_absent)
 
     @model_validator(mode="after")
     def _consistent(self) -> Path:
@@ -80,16 +98,33 @@ class Path(Spec):
             for i in range(1, len(self.speed_mps)):
                 if self.speed_mps[i][0] <= self.speed_mps[i - 1][0]:
                     raise broken("is not later than the time before", "speed_mps", i, 0)
+        slowest = min(v for _, v in self.speed_mps) if isinstance(self.speed_mps, tuple) else self.speed_mps
+        if self.sway is not None and slowest == 0.0:
+            raise broken("needs a speed_mps that is above 0 at all times: who stands does not sway", "sway")
         return self
 
 
+class Surface(Spec):
+    """What a material is, in place of what the seed draws from `scenarios/parts/materials.yaml`.
+
+    reflectivity: diffuse, at 850-905 nm. colour: red, green, blue, sRGB. What is left out is drawn as ever.
+    """
+
+    reflectivity: Share | None = None
+    colour: tuple[Share, Share, Share] | None = None
+
+
 class Actor(Spec):
-    """A scripted body. `scale`: size relative to the part's own, the same on all axes (targets vary ±8 %)."""
+    """A scripted body. `scale`: size relative to the part's own, the same on all axes (targets vary ±8 %).
+
+    `materials`: those of its part that are not left to the seed, by name.
+    """
 
     part: Name  # a file of scenarios/parts
     category: Category
     path: Path
     scale: Annotated[float, Field(ge=0.1, le=10, allow_inf_nan=False)] = 1.0
+    materials: dict[Name, Surface] | None = Field(default=None, exclude_if=_is_absent)
 
 
 class Scatter(Spec):
@@ -111,13 +146,41 @@ class Scatter(Spec):
         return self
 
 
+class Bend(Spec):
+    """Where a road turns: its centre line, y = 0 before, has a bend from `at_m` to `at_m` + `length_m`.
+
+    The curvature grows evenly from 0 to 1 / radius_m over the first `transition_m`, and falls back over the
+    last (clothoids). On such a road all x and y of the file (paths, lanes, background areas) are distances
+    along the centre line and to its left, headings are against it: a path that would be a straight line is
+    parallel to the road. Speeds stay speeds over ground.
+    """
+
+    at_m: Finite
+    length_m: Positive
+    radius_m: Annotated[float, Field(ge=10, allow_inf_nan=False)]
+    turn: Literal["left", "right"]
+    transition_m: Positive = 10.0
+
+    @model_validator(mode="after")
+    def _turns_once(self) -> Bend:
+        if 2.0 * self.transition_m > self.length_m:
+            raise broken("is more than half of length_m", "transition_m")
+        if self.length_m - self.transition_m > pi * self.radius_m:
+            raise broken("turns the road by more than 180 degrees at this radius_m", "length_m")
+        return self
+
+
 class Road(Spec):
-    """A paved strip along x. `lanes_m`: (y0, y1) of the strips that are driven, free of background."""
+    """A paved strip along x. `lanes_m`: (y0, y1) of the strips that are driven, free of background.
+
+    A road with a bend is bare pavement: no lines, no grass.
+    """
 
     kind: Literal["lot", "road"] = "lot"
     length_m: Positive = 400.0
     width_m: Positive = 60.0
     lanes_m: tuple[tuple[Finite, Finite], ...] = ()
+    bend: Bend | None = Field(default=None, exclude_if=_is_absent)
 
     @model_validator(mode="after")
     def _lanes_are_on_the_road(self) -> Road:
@@ -155,6 +218,24 @@ class Scenario(Spec):
     systems: dict[Literal["car", "wearable"], System] = Field(min_length=1)
     background: tuple[Scatter, ...] = ()
     faults: dict[str, object] = {}
+
+    @model_validator(mode="after")
+    def _fits_into_the_bend(self) -> Scenario:
+        bend = self.road.bend
+        if bend is None:
+            return self
+        for name, system in self.systems.items():
+            for actor, declared in system.actors.items():
+                here = ("systems", name, "actors", actor, "path", "waypoints_m")
+                if len(declared.path.waypoints_m) > 2:
+                    raise broken("has more than two points, which a road with a bend has no room for", *here)
+                for i, (_, y) in enumerate(declared.path.waypoints_m):
+                    if abs(y) > INSIDE_BEND * bend.radius_m:
+                        raise broken(f"is too near the centre of a bend of {bend.radius_m:g} m", *here, i, 1)
+        for i, scatter in enumerate(self.background):
+            if max(abs(scatter.area_m[1]), abs(scatter.area_m[3])) > INSIDE_BEND * bend.radius_m:
+                raise broken(f"reaches too near the centre of a bend of {bend.radius_m:g} m", "background", i)
+        return self
 
     def system(self, name: str) -> System:
         """The system of that name. KeyError: the scenario has none."""

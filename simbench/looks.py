@@ -67,7 +67,9 @@ def plain_paint(ground_colour: Colour = (0.33, 0.33, 0.33)) -> Paint:
 
 def road_paint(road: Road, asphalt: Colour, marking: Colour, grass: Colour) -> Paint:
     """Grass on both sides of the pavement, an unbroken line at either edge of the lanes, dashes between
-    lanes."""
+    lanes. A road with a bend is bare: strips are straight."""
+    if road.bend is not None:
+        return plain_paint(asphalt)
     half_length, half_width = 0.5 * road.length_m, 0.5 * road.width_m
     lanes = sorted(road.lanes_m)
     strips = [

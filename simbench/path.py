@@ -1,4 +1,8 @@
-"""Where a scripted actor is at any time: a path in the plane at a piecewise linear speed, in closed form."""
+"""Where a scripted actor is at any time: a path in the plane at a piecewise linear speed, in closed form.
+
+A sway adds d(t) = amplitude sin(2 pi f t + phase) to the left of the path. Over ground the actor then moves
+at v (1 - k d) along the path and d' across it, v being the speed along the path and k its curvature.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,10 @@ import numpy as np
 from jaxtyping import Float64, Int64
 from scipy.interpolate import CubicSpline
 
-from scenarios.scenario import Path
+from scenarios.scenario import Path, Sway
+from simbench.bend import BentRoad
+
+TABLE_M = 0.02  # between the knots of a curve
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -24,9 +31,11 @@ class Track:
     knot_heading_rad: Float64[np.ndarray, " k"]
     speed_t_s: Float64[np.ndarray, " v"]
     speed_mps: Float64[np.ndarray, " v"]
+    sway: Sway | None = None
 
     def arc_m(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
-        """Distance driven since t = 0 (negative before), the exact integral of the speed profile."""
+        """Distance driven along the path since t = 0 (negative before), the exact integral of the speed
+        profile; a sway adds nothing to it."""
         t = np.asarray(t_ns, dtype=np.float64) * 1e-9
         driven: np.ndarray
         if len(self.speed_mps) == 1:
@@ -40,16 +49,50 @@ class Track:
         return float(_integral(np.zeros(1), self.speed_t_s, self.speed_mps)[0])
 
     def speed_at(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
-        """Speed along the path in m/s."""
+        """Speed over ground in m/s."""
+        if self.sway is None:
+            return self._profile(t_ns)
+        along_mps, _, across_mps = self._swaying(self.sway, t_ns)
+        speed: np.ndarray = np.hypot(along_mps, across_mps)
+        return speed
+
+    def _profile(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
         t_s = np.asarray(t_ns, dtype=np.float64) * 1e-9
         speed: np.ndarray = np.interp(t_s, self.speed_t_s, self.speed_mps)
         return speed
+
+    def _swaying(
+        self, sway: Sway, t_ns: Int64[np.ndarray, " n"]
+    ) -> tuple[Float64[np.ndarray, " n"], Float64[np.ndarray, " n"], Float64[np.ndarray, " n"]]:
+        """Speed along the path, offset to its left in metres, and the offset's rate."""
+        t_s = np.asarray(t_ns, dtype=np.float64) * 1e-9
+        rate = 2.0 * np.pi * sway.frequency_hz
+        angle = rate * t_s + np.deg2rad(sway.phase_deg)
+        left_m = sway.amplitude_m * np.sin(angle)
+        shortened = 1.0 - self._curvature(self.arc_m(t_ns)) * left_m
+        return self._profile(t_ns) * shortened, left_m, sway.amplitude_m * rate * np.cos(angle)
+
+    def _curvature(self, arc_m: Float64[np.ndarray, " n"]) -> Float64[np.ndarray, " n"]:
+        if self._curve is None:
+            return np.zeros(len(arc_m))
+        inside = np.clip(arc_m, self.knot_s[0], self.knot_s[-1])
+        curvature: np.ndarray = np.where(arc_m == inside, self._curve(inside, 1)[:, 2], 0.0)
+        return curvature
 
     def at(
         self, t_ns: Int64[np.ndarray, " n"]
     ) -> tuple[Float64[np.ndarray, "n 2"], Float64[np.ndarray, " n"]]:
         """Position [n 2] in metres and heading [n] in radians in the world."""
-        s = self.arc_m(t_ns)
+        xy, heading = self._on_path(self.arc_m(t_ns))
+        if self.sway is None:
+            return xy, heading
+        along_mps, left_m, across_mps = self._swaying(self.sway, t_ns)
+        left = np.stack([-np.sin(heading), np.cos(heading)], axis=1)
+        return xy + left_m[:, None] * left, heading + np.arctan2(across_mps, along_mps)
+
+    def _on_path(
+        self, s: Float64[np.ndarray, " n"]
+    ) -> tuple[Float64[np.ndarray, "n 2"], Float64[np.ndarray, " n"]]:
         inside = np.clip(s, self.knot_s[0], self.knot_s[-1])
         if self._curve is not None:
             curve = self._curve(inside)
@@ -84,14 +127,20 @@ def _integral(
     return whole
 
 
-def make_track(path: Path) -> Track:
-    """The track of a declared path. Two waypoints are exact; more are a C2 spline tabled every 2 cm."""
+def make_track(path: Path, road: BentRoad | None = None) -> Track:
+    """The track of a declared path, on a road with a bend or a straight one (None).
+
+    Two waypoints are exact; more are a C2 spline tabled every 2 cm, and so is a path along a bend. BadInput:
+    a path reaches the centre of the bend.
+    """
     points = np.asarray(path.waypoints_m, dtype=np.float64)
     if isinstance(path.speed_mps, tuple):
         profile = np.asarray(path.speed_mps, dtype=np.float64)
     else:
         profile = np.array([[0.0, path.speed_mps]], dtype=np.float64)
-    if len(points) == 1:
+    if road is not None:
+        table_s, table_xy, heading = _bent(path, road, moves=bool(profile[:, 1].any()))
+    elif len(points) == 1:
         heading = np.array([np.deg2rad(path.heading_deg)])
         table_s, table_xy = np.zeros(1), points
     elif len(points) == 2:
@@ -101,7 +150,7 @@ def make_track(path: Path) -> Track:
     else:
         chord = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
         spline = CubicSpline(chord, points)
-        u = np.linspace(0.0, chord[-1], max(int(chord[-1] / 0.02), 2))
+        u = np.linspace(0.0, chord[-1], max(int(chord[-1] / TABLE_M), 2))
         table_xy = spline(u)
         tangent = spline(u, 1)
         table_s = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(table_xy, axis=0).T))])
@@ -112,4 +161,35 @@ def make_track(path: Path) -> Track:
         knot_heading_rad=heading,
         speed_t_s=profile[:, 0],
         speed_mps=profile[:, 1],
+        sway=path.sway,
     )
+
+
+def _bent(
+    path: Path, road: BentRoad, moves: bool
+) -> tuple[Float64[np.ndarray, " k"], Float64[np.ndarray, "k 2"], Float64[np.ndarray, " k"]]:
+    """Arc lengths (0 at the first waypoint), places and headings of a straight declared path on a bent road.
+
+    Tabled where the path is beside the bend; before and after, it is straight. One that crosses the road at a
+    right angle is straight, and who never moves needs no path.
+    """
+    first, *more = np.asarray(path.waypoints_m, dtype=np.float64)
+    step = more[0] - first if more else None
+    angle = float(np.deg2rad(path.heading_deg)) if step is None else float(np.arctan2(step[1], step[0]))
+    if moves and abs(np.cos(angle)) > 1e-9:
+        ends = (np.array([road.start_m, road.end_m]) - first[0]) / np.cos(angle)
+        low, high = float(ends.min()), float(ends.max())
+        u = np.linspace(low, high, max(int((high - low) / TABLE_M), 2))
+    else:
+        u = np.zeros(1)
+    on_road = first + u[:, None] * np.array([np.cos(angle), np.sin(angle)])
+    xy = road.to_world(on_road)
+    heading = road.world_heading_rad(on_road, angle) if moves else road.heading_rad(on_road[:, 0]) + angle
+    arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(xy, axis=0).T))])
+    if u[0] > 0.0:
+        start = -u[0]
+    elif u[-1] < 0.0:
+        start = arc[-1] - u[-1]
+    else:
+        start = np.interp(0.0, u, arc)
+    return arc - start, xy, heading

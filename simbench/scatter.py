@@ -9,6 +9,7 @@ from jaxtyping import Float64
 
 from scenarios.errors import BadInput
 from scenarios.scenario import Scatter
+from simbench.bend import BentRoad
 
 MAX_TRIES = 400
 CLEARANCE_M = 0.4
@@ -33,9 +34,11 @@ def place(
     keep_off_m: Float64[np.ndarray, "k 3"],
     duration_s: float,
     rng: np.random.Generator,
+    road: BentRoad | None = None,
 ) -> tuple[Placement, ...]:
     """Draw the background. `radius_m`: footprint radius by part. `keep_off_m` [k 3]: circles (x, y, radius)
-    that actors sweep. Raises BadInput when an area has no room."""
+    that actors sweep in the world. `road`: its bend, by which areas, lanes and placements are given; None: it
+    is straight, and all are in the world. Raises BadInput when an area has no room."""
     taken = [tuple(row) for row in keep_off_m]
     placed: list[Placement] = []
     for group in scatter:
@@ -48,6 +51,8 @@ def place(
                 if group.align_deg is not None:
                     heading = np.deg2rad(group.align_deg)
                 walk = group.speed_mps * duration_s
+                if road is not None:  # the inner side of a bend is shorter than its centre line
+                    walk *= road.longest_ratio(max(abs(y), abs(y + walk * np.sin(heading))))
                 radius = radius_m[group.part] * scale
                 swept = [
                     (x + u * walk * np.cos(heading), y + u * walk * np.sin(heading), radius)
@@ -58,13 +63,14 @@ def place(
                     for (_, cy, cr) in swept
                     for lane in lanes_m
                 )
+                circles = swept if road is None else _in_world(swept, road)
                 hits = any(
                     np.hypot(cx - tx, cy - ty) < cr + tr + CLEARANCE_M
-                    for (cx, cy, cr) in swept
+                    for (cx, cy, cr) in circles
                     for (tx, ty, tr) in taken
                 )
                 if not on_lane and not hits:
-                    taken += swept
+                    taken += circles
                     placed.append(
                         Placement(
                             part=group.part,
@@ -82,3 +88,10 @@ def place(
                     f"make the area larger or the count smaller"
                 )
     return tuple(placed)
+
+
+def _in_world(circles: list[tuple[float, float, float]], road: BentRoad) -> list[tuple[float, float, float]]:
+    """Circles (along, left, radius) about the same points of the world (x, y, radius)."""
+    table = np.array(circles)
+    xy = road.to_world(table[:, :2])
+    return [(x, y, radius) for (x, y), radius in zip(xy.tolist(), table[:, 2].tolist(), strict=True)]

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
-import yaml
 from jaxtyping import Bool, Float64, Int32, Int64
 
 from scenarios.errors import BadInput
-from scenarios.scenario import Path, Scenario, System
+from scenarios.palette import palette
+from scenarios.scenario import Path, Scenario, Surface, System
 from scenarios.seeding import stream
 from simbench import scatter
+from simbench.bend import BentRoad
 from simbench.looks import Looks, Paint, road_paint
 from simbench.path import Track, make_track
 from simbench.sensors import rays
@@ -172,18 +173,15 @@ def part_info(part: str) -> PartInfo:
     return PartInfo(size_m=high - low, centre_m=0.5 * (high + low), radius_m=float(np.hypot(*reach)))
 
 
-@lru_cache(maxsize=1)
-def materials() -> dict[str, dict[str, Any]]:
-    """The palette: colours and LiDAR reflectivity of every material name that parts use."""
-    loaded: dict[str, dict[str, Any]] = yaml.safe_load((PARTS / "materials.yaml").read_text("utf-8"))
-    return loaded
-
-
 def _attach(
     spec: Any, part: str, prefix: str, scale: float, pose: tuple[float, float, float], mocap: bool,
     seed: int, scene: dict[str, tuple[list[float], float]], reflectivity: dict[str, float],
+    given: Mapping[str, Surface],
 ) -> None:  # fmt: skip
-    """Attach a scaled, freshly coloured copy of a part under `prefix/`, standing at pose (x, y, heading)."""
+    """Attach a scaled, freshly coloured copy of a part under `prefix/`, standing at pose (x, y, heading).
+
+    given: by material, what is not drawn. Every material draws from a stream of its own, given or not.
+    """
     import mujoco
 
     child = mujoco.MjSpec.from_file(str(PARTS / f"{part}.xml"))
@@ -194,11 +192,14 @@ def _attach(
     for joint in child.joints:
         joint.pos = joint.pos * scale
     for material in child.materials:
-        entry = materials()[material.name]
+        entry = palette()[material.name]
         if entry["per"] == "scene":
             colour, value = scene[material.name]
         else:
             colour, value = _draw_material(stream(seed, "material", prefix, material.name), entry)
+        if (surface := given.get(material.name)) is not None:
+            colour = colour if surface.colour is None else list(surface.colour)
+            value = value if surface.reflectivity is None else surface.reflectivity
         material.rgba = [*colour, 1.0]
         material.specular, material.shininess = entry["specular"], entry["shininess"]
         reflectivity[f"{prefix}/{material.name}"] = value
@@ -227,13 +228,14 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
     spec.modelname = scenario.name
     scene = {
         name: _draw_material(stream(seed, "material", "scene", name), entry)
-        for name, entry in sorted(materials().items())
+        for name, entry in sorted(palette().items())
     }
     paint = road_paint(scenario.road, *(_colour(scene, name) for name in ("asphalt", "marking", "grass")))
     _dress(spec, scene, paint)
     reflectivity: dict[str, float] = {"asphalt": scene["asphalt"][1]}
 
-    tracks = {name: make_track(actor.path) for name, actor in system.actors.items()}
+    road = None if scenario.road.bend is None else BentRoad(scenario.road.bend)
+    tracks = {name: make_track(actor.path, road) for name, actor in system.actors.items()}
     end_s = system.duration_s + AFTER_S
     times = np.arange(-int(0.5e9), int(end_s * 1e9), int(0.1e9))
     radius_m = {name: part_info(actor.part).radius_m * actor.scale for name, actor in system.actors.items()}
@@ -248,15 +250,18 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
         np.concatenate(sweep),
         end_s,
         stream(seed, "background"),
+        road,
     )
 
     entries: list[tuple[str, str, str, float, Track]] = [
         (name, actor.part, actor.category, actor.scale, tracks[name]) for name, actor in system.actors.items()
     ]
+    given = {name: actor.materials for name, actor in system.actors.items() if actor.materials is not None}
     for number, item in enumerate(background):
         end = (item.xy_m[0] + np.cos(item.heading_rad), item.xy_m[1] + np.sin(item.heading_rad))
         path = Path(waypoints_m=(item.xy_m, end), speed_mps=item.speed_mps)
-        entries.append((f"{item.part}-{number}", item.part, item.category, item.scale, make_track(path)))
+        track = make_track(path, road)
+        entries.append((f"{item.part}-{number}", item.part, item.category, item.scale, track))
 
     names = [entry[0] for entry in entries]
     if twice := sorted({name for name in names if names.count(name) > 1}):
@@ -267,7 +272,8 @@ def build_world(scenario: Scenario, system: System, seed: int) -> World:
         info = part_info(part)
         moves = object_id < len(system.actors) or bool(np.any(track.speed_mps > 0.0))
         (xy,), (heading,) = track.at(np.zeros(1, dtype=np.int64))
-        _attach(spec, part, name, scale, (xy[0], xy[1], heading), moves, seed, scene, reflectivity)
+        pose = (xy[0], xy[1], heading)
+        _attach(spec, part, name, scale, pose, moves, seed, scene, reflectivity, given.get(name, {}))
         length, width, height = (float(v) for v in info.size_m * scale)
         objects.append(
             ObjectInfo(object_id=object_id, name=name, category=category, size_m=(length, width, height))
@@ -419,7 +425,7 @@ def _tabulate(
         geom_object[row] = by_name.get(prefix, GROUND)
         name = model.material(int(model.geom_matid[geom_id])).name
         value[row] = reflectivity[name]
-        slope_deg[row] = materials()[name.split("/")[-1]].get("roughness_deg", 0.0)
+        slope_deg[row] = palette()[name.split("/")[-1]].get("roughness_deg", 0.0)
         body_index[row] = index_of.get(body_id, 0)
         if body_index[row]:
             matrix = np.empty(9)

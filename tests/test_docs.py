@@ -13,7 +13,9 @@ from click.testing import CliRunner
 
 from fusion.messages import Measurement
 from scenarios.faults import FAULTS
-from scenarios.scenario import CameraSensor
+from scenarios.load import list_scenarios
+from scenarios.scenario import Bend, CameraSensor, Surface, Sway
+from scenarios.scenario import Path as ScenarioPath
 from simbench.cli import main
 from simbench.score.metrics import as_markdown
 
@@ -31,6 +33,13 @@ def test_the_fault_document_names_every_fault_and_every_field() -> None:
         assert f"`{name}`" in text
         for field in spec.model_fields:
             assert f"`{field}`" in text, f"{name}: {field}"
+
+
+def test_the_scenario_document_names_every_scenario_and_every_word_of_a_path_and_a_bend() -> None:
+    text = (DOCS / "scenarios.md").read_text(encoding="utf-8")
+    assert set(list_scenarios()) == set(re.findall(r"^\| `([a-z-]+)` \|", text, re.MULTILINE))
+    for field in (*ScenarioPath.model_fields, *Sway.model_fields, *Bend.model_fields, *Surface.model_fields):
+        assert re.search(rf"\b{field}\b", text), field
 
 
 def rows_of(text: str) -> dict[str, str]:

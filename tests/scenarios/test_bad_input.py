@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import BadInput, Where, dotted, nearest
 from scenarios.library import PACKAGE
-from scenarios.load import load_scenario
+from scenarios.load import list_scenarios, load_scenario
 
 GOOD = """\
 name: small
@@ -154,6 +154,77 @@ CORPUS = [
     ("rms_deg: 0.5", "profile: bike", 28, "faults.motion.vibration_deg.profile", "allowed: auto, car, rider"),
     ("name: small", "name: small\nname: small", 2, None, "stands here twice"),
     ("count: 2", "count: *n", 24, None, "alias *n"),
+    # a sway, a bend, an actor's own materials
+    (
+        "speed_mps: 10",
+        "speed_mps: 10\n          sway: {amplitude_m: -0.1, frequency_hz: 1}",
+        17,
+        "systems.car.actors.car.path.sway.amplitude_m",
+        "must not be negative, is -0.1",
+    ),
+    (
+        "speed_mps: 10",
+        "speed_mps: [[0, 5], [1, 0]]\n          sway: {amplitude_m: 0.1, frequency_hz: 1}",
+        17,
+        "systems.car.actors.car.path.sway",
+        "above 0 at all times: who stands does not sway",
+    ),
+    (
+        "[[20, -3]]",
+        "[[2.6, 1.4]]\n          sway: {amplitude_m: 0.3, frequency_hz: 1, phase_deg: -90}",
+        21,
+        "systems.car.actors.rider.path.waypoints_m",
+        "'rider' stands inside 'car' at the start",
+    ),
+    (
+        "{lanes_m: [[-1.7, 1.7]]}",
+        "{bend: {at_m: 0, length_m: 50, radius_m: 50, turn: lft}}",
+        3,
+        "road.bend.turn",
+        "did you mean 'left'?",
+    ),
+    (
+        "{lanes_m: [[-1.7, 1.7]]}",
+        "{bend: {at_m: 0, length_m: 18, radius_m: 50, turn: left}}",
+        3,
+        "road.bend.transition_m",
+        "is more than half of length_m",
+    ),
+    (
+        "{lanes_m: [[-1.7, 1.7]]}",
+        "{bend: {at_m: 0, length_m: 168, radius_m: 50, turn: left}}",
+        3,
+        "road.bend.length_m",
+        "by more than 180 degrees at this radius_m",
+    ),
+    (
+        "{lanes_m: [[-1.7, 1.7]]}",
+        "{bend: {at_m: 0, length_m: 50, radius_m: {uniform: [24, 50]}, turn: left}}",
+        24,
+        "background[0]",
+        "too near the centre of a bend of 24 m",
+    ),
+    (
+        "      rider:\n        part",
+        "      rider:\n        materials: {topp: {reflectivity: 0.04}}\n        part",
+        18,
+        "systems.car.actors.rider.materials.topp",
+        "(allowed: frame, helmet, shoes, skin, top, trousers); did you mean 'top'?",
+    ),
+    (
+        "      rider:\n        part",
+        "      rider:\n        materials: {rubber: {reflectivity: 0.04}}\n        part",
+        18,
+        "systems.car.actors.rider.materials.rubber",
+        "the part 'escooter_rider' has no material 'rubber' of its own",
+    ),
+    (
+        "      rider:\n        part",
+        "      rider:\n        materials: {top: {reflectivity: 4}}\n        part",
+        18,
+        "systems.car.actors.rider.materials.top.reflectivity",
+        "must be <= 1, is 4",
+    ),
     # what a distribution could draw
     (
         "speed_mps: 10",
@@ -223,14 +294,32 @@ def test_a_file_that_is_no_mapping_is_refused(tmp_path: Path, text: str) -> None
     assert "is a mapping" in str(refused(tmp_path, text))
 
 
+BENT = GOOD.replace("{lanes_m: [[-1.7, 1.7]]}", "{bend: {at_m: 0, length_m: 50, radius_m: 40, turn: left}}")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "field", "says"),
+    [
+        ("[[20, -3]]", "[[20, -33]]", 21, "waypoints_m[0][1]", "too near the centre of a bend of 40 m"),
+        ("[[20, -3]]", "[[20, 3], [30, 4], [40, 3]]", 21, "waypoints_m", "more than two points"),
+    ],
+)
+def test_a_path_that_a_bend_has_no_room_for_is_refused(
+    tmp_path: Path, old: str, new: str, line: int, field: str, says: str
+) -> None:
+    error = refused(tmp_path, BENT.replace(old, new, 1))
+    assert error.line == line and error.field == f"systems.car.actors.rider.path.{field}"
+    assert says in str(error)
+
+
 def test_an_unknown_name_gets_the_nearest_and_the_list() -> None:
     with pytest.raises(BadInput) as caught:
         load_scenario("overtake-aproach")
     assert caught.value.hint == "overtake-approach"
-    assert caught.value.allowed == "empty-road, overtake-approach, overtake-recede, static-board"
+    assert caught.value.allowed == ", ".join(list_scenarios())
     assert str(caught.value) == (
-        "unknown scenario 'overtake-aproach' (allowed: empty-road, overtake-approach, overtake-recede, "
-        "static-board); did you mean 'overtake-approach'?"
+        f"unknown scenario 'overtake-aproach' (allowed: {', '.join(list_scenarios())}); "
+        "did you mean 'overtake-approach'?"
     )
 
 

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata
 
 from scenarios.errors import BadInput
+from scenarios.palette import palette
 from scenarios.scenario import Scatter
 from scenarios.seeding import stream
 from simbench.sensors import lidar, rays
-from simbench.world import GROUND, build_world, half_extent, materials, part_info
+from simbench.world import GROUND, build_world, half_extent, part_info
 from tests.simbench.scenes import Stage, SystemName, scripted_motion, staged
 
 S = 1_000_000_000
@@ -201,14 +202,14 @@ def test_paint_on_the_road_is_for_cameras_only() -> None:
 
 
 def test_colours_and_reflectivities_are_drawn_in_their_ranges_once_per_scene_or_instance() -> None:
-    palette: dict[str, dict[str, Any]] = materials()
+    known = palette()
     per_instance: dict[str, set[float]] = {}
     for seed in range(4):
         world = of_seed("car", seed).world
         shared: dict[str, set[float]] = {}
         for row, geom in enumerate(world.geom_model_id):
             name = world.model.material(int(world.model.geom_matid[geom])).name
-            entry, value = palette[name.split("/")[-1]], float(world.reflectivity[row])
+            entry, value = known[name.split("/")[-1]], float(world.reflectivity[row])
             assert entry["reflectivity"][0] <= value <= entry["reflectivity"][1]
             where = shared if entry["per"] == "scene" else per_instance
             where.setdefault(name.split("/")[-1], set()).add(value)
