@@ -125,7 +125,11 @@ for entry in sorted(found, key=lambda e: e.name): print(entry.name, entry.load()
     done = run(installed, code)
     assert done.returncode == 0, done.stderr
     assert done.stdout.splitlines() == [
+        "frustum_dbscan FrustumDbscan",
+        "nearest_gap NearestGap",
         "probabilistic Probabilistic",
+        "roi_cluster RoiCluster",
+        "shrunken_median ShrunkenMedian",
         "static_projection StaticProjection",
         "static_projection_ground StaticProjectionGround",
     ]
