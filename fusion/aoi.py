@@ -17,7 +17,14 @@ from fusion.camera import MIN_DEPTH_M, PinholeCamera, inside_box
 from fusion.geometry import Transform
 from fusion.messages import BoxPx
 
-_BORDER_STEPS = np.linspace(0.0, 1.0, 9)
+_STEPS = np.linspace(0.0, 1.0, 9)
+_BORDER = np.concatenate(  # points on the border of the unit square, [36 2]
+    [
+        np.column_stack(side)
+        for value in (np.zeros(9), np.ones(9))
+        for side in ((_STEPS, value), (value, _STEPS))
+    ]
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,7 +79,9 @@ def map_into_boxes(
 
 def _bearing_bounds(boxes_px: Sequence[BoxPx], camera: PinholeCamera) -> tuple[float, float, float, float]:
     """Bounds (left, top, right, bottom) of x/z and y/z over the borders of all boxes, with a margin."""
-    rays = camera.unproject(np.concatenate([_border(box) for box in boxes_px]))
+    corners = np.array(boxes_px)
+    low, high = corners[:, None, :2], corners[:, None, 2:]
+    rays = camera.unproject((low + (high - low) * _BORDER).reshape(-1, 2))
     if not np.isfinite(rays).all():  # the distortion cannot be inverted there: no bearing may be ruled out
         return (-np.inf, -np.inf, np.inf, np.inf)
     low, high = rays.min(axis=0), rays.max(axis=0)
@@ -80,13 +89,6 @@ def _bearing_bounds(boxes_px: Sequence[BoxPx], camera: PinholeCamera) -> tuple[f
     left, top = (low - margin).tolist()
     right, bottom = (high + margin).tolist()
     return left, top, right, bottom
-
-
-def _border(box_px: BoxPx) -> Float64[np.ndarray, "36 2"]:
-    x0, y0, x1, y1 = box_px
-    u, v = x0 + (x1 - x0) * _BORDER_STEPS, y0 + (y1 - y0) * _BORDER_STEPS
-    sides = [(u, np.full(9, y0)), (u, np.full(9, y1)), (np.full(9, x0), v), (np.full(9, x1), v)]
-    return np.concatenate([np.stack(side, axis=1) for side in sides])
 
 
 def _crop(

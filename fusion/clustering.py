@@ -132,9 +132,10 @@ def _shares(
 ) -> tuple[Int64[np.ndarray, " c"], Int64[np.ndarray, " c"]]:
     """Per centre the range [low, high) of the sorted values nearest to it and within its reach."""
     middle = 0.5 * (centres[1:] + centres[:-1])
-    start = np.maximum(np.concatenate([[-np.inf], middle]), centres - reach_m)
-    stop = np.minimum(np.concatenate([middle, [np.inf]]), centres + reach_m)
-    return np.searchsorted(ascending_m, start, "left"), np.searchsorted(ascending_m, stop, "right")
+    start, stop = centres - reach_m, centres + reach_m
+    np.maximum(start[1:], middle, out=start[1:])
+    np.minimum(stop[:-1], middle, out=stop[:-1])
+    return ascending_m.searchsorted(start, "left"), ascending_m.searchsorted(stop, "right")
 
 
 def _densest_windows(
@@ -147,20 +148,22 @@ def _densest_windows(
     """
     left, centres = ascending_m, np.zeros(0)
     while len(centres) < most and len(left) >= max(min_points, 1):
-        ends = np.searchsorted(left, left + width_m, side="right")
-        start = int(np.argmax(ends - np.arange(len(left))))
+        ends = left.searchsorted(left + width_m, side="right")
+        start = int((ends - np.arange(len(left))).argmax())
         end = int(ends[start])
         if end - start < min_points:
             break
-        centre = float(left[start:end].mean())
+        sums = np.zeros(len(left) + 1)
+        left.cumsum(out=sums[1:])
+        centre = float(sums[end] - sums[start]) / (end - start)
         for _ in range(_ITERATIONS):
-            start, end = np.searchsorted(left, (centre - 0.5 * width_m, centre + 0.5 * width_m)).tolist()
-            moved = float(left[start:end].mean()) if end > start else centre
+            start, end = left.searchsorted((centre - 0.5 * width_m, centre + 0.5 * width_m)).tolist()
+            moved = float(sums[end] - sums[start]) / (end - start) if end > start else centre
             if abs(moved - centre) < 1e-9:
                 break
             centre = moved
         centres = np.append(centres, centre)
-        left = np.delete(left, slice(start, max(end, start + 1)))
+        left = np.concatenate([left[:start], left[max(end, start + 1) :]])
     return np.sort(centres)
 
 
