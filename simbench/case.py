@@ -11,18 +11,23 @@ from scenarios.scenario import Scenario
 from simbench.drive import Driven
 from simbench.exhibit import PairView
 from simbench.faults.receipt import Receipt
+from simbench.formats.scene import RecordedScene
 from simbench.score.metrics import METRICS, Row
 from simbench.score.score import Scores
 
 ORACLE = "oracle"
 Images = Literal["none", "raycast", "gl"]
+Boxes = Literal["labels", "model"]
 Status = Literal["ok", "pipeline_error", "timeout", "bench_error", "receipt_mismatch"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
     """What to record and what to run on it. `faults`: as `--faults` gives them, in place of or on top of the
-    scenario's own; empty: just those."""
+    scenario's own; empty: just those.
+
+    Of recorded data (`kitti:PATH`) the seed is the number of the recording; `boxes` says where detections
+    come from, `frames` which frames of a sequence are played (None: all)."""
 
     scenario: str
     system: str
@@ -31,6 +36,10 @@ class Job:
     faults: tuple[str, ...] = ()
     images: Images = "none"
     size_px: tuple[int, int] | None = None
+    boxes: Boxes = "labels"
+    frames: tuple[int, int] | None = None
+    calibration: str = "true"  # as `--calibration` gives it
+    found_in: str | None = None  # the file of the found calibration that the pipelines are told
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +59,7 @@ class JobResult:
     """All cases of a job, and what its report needs."""
 
     job: Job
-    scenario: Scenario
+    scenario: Scenario | RecordedScene
     faults: FaultSet
     shake: str
     receipts: tuple[Receipt, ...]

@@ -1,4 +1,4 @@
-"""The command line: `simbench demo | run | list | describe | timeline | doctor | learn`.
+"""The command line: `simbench demo | run | calibrate | list | describe | timeline | doctor | learn`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 if TYPE_CHECKING:
-    from simbench.case import Images, Job, JobResult
+    from simbench.case import Boxes, Images, Job, JobResult
 
 BASELINES = ("static_projection", "static_projection_ground", "probabilistic")
 FAILED, BAD_INPUT, BENCH_ERROR, NOTHING = 1, 2, 3, 5
@@ -70,6 +71,19 @@ def _seeds(_: click.Context, __: click.Parameter, text: str) -> tuple[int, ...]:
             raise click.BadParameter(f"'{part}' is not a range of seeds from low to high")
         found += [seed for seed in range(low, high + 1) if seed not in found]
     return tuple(found)
+
+
+def _span(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    first, dash, last = text.partition("-")
+    numbers = (first, last if dash else first)
+    if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in numbers):
+        raise click.BadParameter(f"'{text}' is not a range of frames; allowed: 0-99")
+    low, high = int(numbers[0]), int(numbers[1])
+    if high < low:
+        raise click.BadParameter(f"'{text}' is not a range of frames from low to high")
+    return low, high
 
 
 def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
@@ -153,15 +167,28 @@ def demo(
     help="Replaces the scenario's same fault, adds the others; 'none' clears. May be repeated.",
 )  # fmt: skip
 @click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
+@click.option(
+    "--boxes", type=click.Choice(["labels", "model"]), default="labels", show_default=True,
+    help="Recorded data: take the labels' boxes, or what the detector model makes of them.",
+)  # fmt: skip
+@click.option(
+    "--frames", "span", callback=_span, default=None, metavar="FIRST-LAST",
+    help="Recorded sequences: only these frames.",
+)  # fmt: skip
+@click.option(
+    "--calibration", default="true", show_default=True, metavar="true|found[:FILE]",
+    help="What the pipelines are told: the truth, or what 'simbench calibrate' finds (or wrote to FILE).",
+)  # fmt: skip
 @_common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...], alone: bool,
-    seeds: tuple[int, ...], images: Images, jobs: int | None, out: Path, as_json: bool,
-    size: tuple[int, int] | None,
+    boxes: Boxes, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...], images: Images,
+    jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
     """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
 
-    Where errors are injected, the same drives are also run with errors off.
+    Where errors are injected, the same drives are also run with errors off. A target kitti:FOLDER is recorded
+    data: every frame (object layout), sequence or drive is a run, called by its number; --seeds picks some.
 
     Example: simbench run overtake-approach --system car --faults timing.trigger_offset_ms=50 --seeds 0-1
     """
@@ -169,7 +196,9 @@ def run(
 
     from scenarios.fault_set import parse_fault_arguments
     from scenarios.load import load_scenario
+    from simbench.calibration.find import found_for
     from simbench.case import Job
+    from simbench.formats.kitti import is_recorded
     from simbench.plugins import load_pipeline
     from simbench.stage import faults_of
 
@@ -179,21 +208,51 @@ def run(
     chosen = tuple(dict.fromkeys(pipelines)) or BASELINES
     for name in chosen:
         load_pipeline(name)
-    parse_fault_arguments(faults)
+    recorded = [target for target in dict.fromkeys(targets) if is_recorded(target)]
     planned = []
+    if recorded and calibration != "true":
+        raise click.UsageError("--calibration is for simulated drives: recorded data bring their own")
+    if recorded:
+        given = click.get_current_context().get_parameter_source("seeds") != ParameterSource.DEFAULT
+        template = Job(
+            scenario="", system=system, seed=0, pipelines=chosen, faults=faults, images=images, size_px=size,
+            boxes=boxes, frames=span,
+        )  # fmt: skip
+        planned += _recorded_jobs(recorded, template, seeds if given else None, alone)
+    if len(recorded) < len(dict.fromkeys(targets)):
+        parse_fault_arguments(faults)
+        if span is not None or boxes != "labels":
+            raise click.UsageError("--frames and --boxes are for recorded data (kitti:FOLDER)")
     for target in dict.fromkeys(targets):
+        if target in recorded:
+            continue
         family = load_scenario(target)
         for name in family.system_names if system == "both" else (system,):
+            if calibration == "found":
+                click.echo(f"calibrating the rig of {name}: this takes about a minute", err=True)
+            found_in = found_for(calibration, out, family, name, size)
             for seed in seeds:
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
-                    images=images, size_px=size,
+                    images=images, size_px=size, calibration=calibration, found_in=found_in,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
                     planned.append(replace(job, faults=("none",), images="none"))
                 planned.append(job)
     _execute(planned, out, images, jobs, as_json)
+
+
+def _recorded_jobs(
+    targets: list[str], template: Job, numbers: tuple[int, ...] | None, alone: bool
+) -> list[Job]:
+    from dataclasses import replace
+
+    from simbench.formats.jobs import plan
+
+    if len(targets) > 1:  # they would share their names and numbers in every table
+        raise click.UsageError(f"one kitti: folder at a time, not {len(targets)}")
+    return plan(replace(template, scenario=targets[0]), numbers, alone=alone)
 
 
 def _execute(planned: list[Job], out: Path, images: Images, workers: int | None, as_json: bool) -> None:
@@ -205,15 +264,17 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
     from simbench.campaign import run_jobs
     from simbench.environment import environment
     from simbench.files import prepare_folder
+    from simbench.formats.kitti import is_recorded
     from simbench.report.page import write_report
     from simbench.sensors import ray_kernel
     from simbench.sensors.compiled import is_compiled
     from simbench.stage import stage
 
     first: dict[tuple[str, str, tuple[str, ...]], Job] = {}
-    for job in planned:
+    simulated = [job for job in planned if not is_recorded(job.scenario)]
+    for job in simulated:
         first.setdefault((job.scenario, job.system, job.faults), job)
-    if not is_compiled(ray_kernel._cast_fans):
+    if simulated and not is_compiled(ray_kernel._cast_fans):
         click.echo("compiling the ray kernels, once: this takes up to a minute", err=True)
     for job in first.values():
         stage(job)  # bad input shows before anything runs
@@ -240,9 +301,9 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
 
 def _video(found: tuple[JobResult, ...], out: Path, images: Images) -> None:
     """One video: the first recording with a target, one with faults if there is one."""
-    from simbench.report.video import write_video
+    from simbench.report.video import moves, write_video
 
-    shown = [r for r in found if r.views and all(c.status == "ok" for c in r.cases)]
+    shown = [r for r in found if moves(r) and all(c.status == "ok" for c in r.cases)]
     for result in sorted(shown, key=lambda r: len(r.faults) == 0)[:1]:
         write_video(result, out, images)
 
@@ -304,15 +365,79 @@ def _print_summary(found: tuple[JobResult, ...]) -> None:
             values = [r.value for c in cases for r in c.rows if r.metric == name and r.value is not None]
             cells.append(f"{fmean(values):16.3f}" if values else f"{'-':>16s}")
         click.echo(f"{key:{width}s}" + "".join(cells))
+    _print_objects(found)
     bad = [(r, c) for r in found for c in r.cases if c.status != "ok"]
     for result, case in bad:
         click.echo(f"{case.status}: {case.pipeline}, {result.job.system} seed {result.job.seed}: {case.why}")
+
+
+def _print_objects(found: tuple[JobResult, ...]) -> None:
+    """Recorded data: what became of every labelled object."""
+    from simbench.report.objects import as_text, object_tables
+
+    for table in object_tables(found):
+        click.echo("\n" + as_text(table))
 
 
 def _quoted(word: str) -> str:
     import shlex
 
     return shlex.quote(word)
+
+
+@main.command()
+@click.argument("rig")
+@click.option("--cameras", default="", metavar="NAME,...", help="Only these cameras. Default: all.")
+@click.option("--poses", type=int, default=20, show_default=True, help="Poses of the board a camera.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of all that is drawn.")
+@click.option(
+    "--click-noise-px", type=float, default=1.0, show_default=True, help="Of a click in the picture, 1 SD."
+)
+@click.option(
+    "--corner-noise-mm", type=float, default=10.0, show_default=True,
+    help="Of a corner picked among LiDAR points, 1 SD, every axis.",
+)  # fmt: skip
+@click.option(
+    "--volume", default="3,6,0.6", show_default=True, metavar="NEAR,FAR,RADIUS",
+    help="Where boards are held: metres from the camera, share of the half diagonal.",
+)  # fmt: skip
+@click.option("--fit-distortion", is_flag=True, help="Fit the lens's distortion (the paper does not).")
+@click.option("--size", callback=_size, default=None, help="Image size in pixels, e.g. 960x600.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="A YAML file for what is found.")
+def calibrate(
+    rig: str, cameras: str, poses: int, seed: int, click_noise_px: float, corner_noise_mm: float,
+    volume: str, fit_distortion: bool, size: tuple[int, int] | None, out: Path | None,
+) -> None:  # fmt: skip
+    """Calibrate a rig as the paper does, with a checkerboard that the bench shows to camera and LiDAR.
+
+    Prints, against the truth: reprojection error, extrinsic error, and the TPR of a static board by pair (the
+    paper's Table I) and inside and outside the calibrated zone.
+
+    Example: simbench calibrate car-six-cameras --out out/calibration.yaml
+    """
+    from simbench.calibration.file import write_calibration
+    from simbench.calibration.study import PairStudy, Settings, calibrate_rig
+    from simbench.calibration.text import lines
+    from simbench.calibration.volume import parse_volume
+    from simbench.files import prepare_folder
+
+    if out is not None:
+        prepare_folder(out.parent)
+    settings = Settings(
+        rig=rig, cameras=tuple(dict.fromkeys(filter(None, cameras.split(",")))), poses=poses, seed=seed,
+        click_noise_px=click_noise_px, corner_noise_m=1e-3 * corner_noise_mm, volume=parse_volume(volume),
+        fit_distortion=fit_distortion, size_px=size,
+    )  # fmt: skip
+
+    def done(pair: PairStudy) -> None:
+        click.echo(f"{pair.camera}: done", err=True)
+
+    study = calibrate_rig(settings, done)
+    for line in lines(study):
+        click.echo(line)
+    if out is not None:
+        write_calibration(study, out)
+        click.echo(f"\nwrote {out}")
 
 
 @main.command("list")
@@ -336,8 +461,11 @@ def list_(kind: str) -> None:
         lines = [(metric.name, metric.definition) for metric in METRICS]
     elif kind == "faults":
         from scenarios.fault_set import describe_faults
+        from scenarios.recorded import ONLY_RECORDED
 
         lines = [(str(f["name"]), str(f["summary"])) for f in describe_faults()]
+        for fault in ONLY_RECORDED.values():
+            lines.append((fault.name, f"{(fault.__doc__ or '').partition(chr(10))[0]} (recorded data only)"))
     elif kind == "scenarios":
         from scenarios.load import list_scenarios, load_scenario
 

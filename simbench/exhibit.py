@@ -24,7 +24,8 @@ class PairView:
 
     box_px: the delivered box, None when the detector missed. outline_px: the true amodal box. mapped: by
     pipeline, which of the points it gave to the target. right: within the paper's window. true_px, told_px:
-    where the target's points really are in the image and where the told calibration puts them (mean).
+    where the target's points really are in the image and where the told calibration puts them (mean). target:
+    which of several targets, by its place among them.
     """
 
     scan_seq: int
@@ -41,10 +42,18 @@ class PairView:
     mapped: Mapping[str, Bool[np.ndarray, " k"]]
     true_px: tuple[float, float]
     told_px: tuple[float, float]
+    target: int = 0
 
 
 def pair_views(recording: Recording, outputs: Mapping[str, Sequence[FusionOutput]]) -> tuple[PairView, ...]:
-    """One view per eligible pair, in the order of frames. Empty without a target."""
+    """One view per eligible pair, by target and then in the order of frames. Empty without a target."""
+    parts = enumerate(recording.by_target)
+    return tuple(view for number, part in parts for view in _views_of(part, number, outputs))
+
+
+def _views_of(
+    recording: Recording, number: int, outputs: Mapping[str, Sequence[FusionOutput]]
+) -> tuple[PairView, ...]:
     truth = recording.truth
     if truth.target_id is None:
         return ()
@@ -100,6 +109,7 @@ def pair_views(recording: Recording, outputs: Mapping[str, Sequence[FusionOutput
                 mapped=mapped,
                 true_px=_mean_px(pair.true_uv_px),
                 told_px=_mean_px(uv[pair.points]),
+                target=number,
             )
         )
     return tuple(result)

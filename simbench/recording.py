@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 from fusion.messages import Calibration, CategorySize, Measurement
 from simbench.truth import Truth
@@ -17,3 +18,15 @@ class Recording:
     categories: Mapping[str, CategorySize]
     messages: tuple[Measurement, ...]
     truth: Truth
+
+    @property
+    def by_target(self) -> tuple[Recording, ...]:
+        """This recording once for every object that is scored, as if it were the only target."""
+        return self._by_target or (self,)
+
+    @cached_property
+    def _by_target(self) -> tuple[Recording, ...]:
+        return tuple(
+            replace(self, truth=replace(self.truth, target_id=target, targets=()))
+            for target in self.truth.targets
+        )

@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 
 from scenarios.describe import describe
+from scenarios.scenario import Scenario
 from scenarios.seeding import stream
 from simbench.case import ORACLE, Case, Job, JobResult
 from simbench.files import write_text
+from simbench.formats.scene import as_yaml
 from simbench.score.metrics import METRICS
 from simbench.score.statistics import summarize
 
@@ -39,14 +41,17 @@ def document(results: Sequence[JobResult], environment: Mapping[str, object]) ->
 
 
 def write(results: Sequence[JobResult], out: Path, environment: Mapping[str, object]) -> dict[str, Any]:
-    """Write result.json, pairs.csv, frames.csv and the resolved scenarios into `out`."""
+    """Write result.json, pairs.csv, frames.csv and the resolved scenarios into `out`; objects.csv where every
+    object of a recording is scored."""
     content = document(results, environment)
     write_text(out / "result.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
     write_text(out / "pairs.csv", _table(results, "pairs"))
     write_text(out / "frames.csv", _table(results, "frames"))
+    if any(case.scores is not None and case.scores.objects for r in results for case in r.cases):
+        write_text(out / "objects.csv", _table(results, "objects"))
     for result in results:
         name = f"scenario-{result.scenario.name}-{result.job.seed}.yaml"
-        write_text(out / name, describe(result.scenario))
+        write_text(out / name, _text(result))
     return content
 
 
@@ -60,6 +65,12 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
         words += ["--faults", text]
     if job.faults != ("none",):
         words.append("--alone")  # this case only, not the same drive with errors off
+    if job.boxes != "labels":
+        words += ["--boxes", job.boxes]
+    if job.frames is not None:
+        words += ["--frames", f"{job.frames[0]}-{job.frames[1]}"]
+    if job.calibration != "true":
+        words += ["--calibration", job.calibration]
     if job.size_px is not None:
         words += ["--size", f"{job.size_px[0]}x{job.size_px[1]}"]
     return shlex.join([*words, "--images", job.images])
@@ -67,8 +78,14 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
 
 def scenario_hash(result: JobResult) -> str:
     """SHA-256 of the concrete scenario's text and its faults."""
-    text = describe(result.scenario) + json.dumps(result.faults.as_data(), sort_keys=True)
+    text = _text(result) + json.dumps(result.faults.as_data(), sort_keys=True)
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
+
+
+def _text(result: JobResult) -> str:
+    """What was played, in full; of recorded data what it was and the hash of its files."""
+    played = result.scenario
+    return describe(played) if isinstance(played, Scenario) else as_yaml(played)
 
 
 def _key(result: JobResult, case: Case) -> dict[str, Any]:

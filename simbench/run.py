@@ -7,77 +7,118 @@ from __future__ import annotations
 
 import time
 import traceback
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
 
-from simbench.capture import Captured
+from scenarios.fault_set import FaultSet
+from scenarios.scenario import Scenario
 from simbench.case import ORACLE, Case, Job, JobResult, failed, scored
 from simbench.drive import drive
-from simbench.exhibit import pair_views
+from simbench.exhibit import PairView, pair_views
 from simbench.faults.draw import shake_words
 from simbench.faults.proof import receipts
 from simbench.faults.receipt import MISMATCH, Receipt
+from simbench.formats.jobs import play_job
+from simbench.formats.kitti import is_recorded
+from simbench.formats.scene import RecordedScene
 from simbench.plugins import load_pipeline
+from simbench.recording import Recording
 from simbench.score.contract import ContractError
-from simbench.score.oracle import score_oracle
-from simbench.score.score import score
+from simbench.score.objects import score_objects, score_oracles
+from simbench.score.pairs import frames_and_pairs
 from simbench.sensors.pictures import TakePicture
-from simbench.stage import Stage, pictures, record, stage
+from simbench.stage import Stage, as_told, pictures, record, stage
 
 
 def run_job(job: Job) -> JobResult:
-    """Scenario -> world -> motion -> sensors -> recording -> pipelines -> scores.
+    """Scenario -> world -> motion -> sensors -> recording -> pipelines -> scores. Of recorded data
+    (`kitti:PATH`): files -> recording -> pipelines -> scores.
 
     Raises BadInput, and gl.RenderingUnavailable where pictures are wanted and nothing can draw. What goes
     wrong in a pipeline becomes the status of its case, what goes wrong in the bench that of all of them.
     """
     clock = Clock()
+    if is_recorded(job.scenario):
+        played = play_job(job)
+        clock.lap("files")
+        made = Made(recording=played.recording, receipts=played.receipts, shake="")
+        result = _guarded(job, played.scene, played.faults, lambda: made, clock)
+        frames_and_pairs.cache_clear()  # a sequence may be large: none is kept beside the next
+        return result
     staged = stage(job)
     clock.lap("world")
     with pictures(job, staged) as picture:
-        try:
-            return _record_and_score(job, staged, picture, clock)
-        except Exception as error:  # a bug of ours must not end the other jobs, nor pass for a result
-            why = _last_line(error)
-            cases = tuple(failed(name, "bench_error", why) for name in (*job.pipelines, ORACLE))
-            return JobResult(
-                job=job, scenario=staged.scenario, faults=staged.faults, shake="", receipts=(), cases=cases
-            )
+        return _guarded(
+            job, staged.scenario, staged.faults, lambda: _record(job, staged, picture, clock), clock
+        )
 
 
-def _record_and_score(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) -> JobResult:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Made:
+    """A recording, simulated or read, and what proves its faults."""
+
+    recording: Recording
+    receipts: tuple[Receipt, ...]
+    shake: str
+
+
+def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) -> Made:
     captured = record(job, staged, picture)
     clock.lap("sensors")
     found = receipts(captured, staged.rig, staged.faults, staged.system.duration_s)
     clock.lap("receipts")
-    cases = [run_case(name, captured) for name in job.pipelines]
+    shake = shake_words(captured.drawn, staged.system.duration_s)
+    recording = as_told(job, staged, captured.recording)
+    return Made(recording=recording, receipts=found, shake=shake)
+
+
+def _guarded(
+    job: Job, scenario: Scenario | RecordedScene, faults: FaultSet, make: Callable[[], Made], clock: Clock
+) -> JobResult:
+    try:
+        made = make()
+        cases, views = _score(job, made, clock)
+        return JobResult(
+            job=job, scenario=scenario, faults=faults, shake=made.shake, receipts=made.receipts, cases=cases,
+            views=views, timings_s=clock.laps,
+        )  # fmt: skip
+    except Exception as error:  # a bug of ours must not end the other jobs, nor pass for a result
+        why = _last_line(error)
+        bad = tuple(failed(name, "bench_error", why) for name in (*job.pipelines, ORACLE))
+        return JobResult(job=job, scenario=scenario, faults=faults, shake="", receipts=(), cases=bad)
+
+
+def _score(job: Job, made: Made, clock: Clock) -> tuple[tuple[Case, ...], tuple[PairView, ...]]:
+    cases = [run_case(name, made) for name in job.pipelines]
     clock.lap("fusion and scores")
-    if staged.system.target is not None:
-        cases.append(scored(ORACLE, score_oracle(captured.recording), None))
+    if made.recording.truth.target_id is not None:
+        cases.append(scored(ORACLE, score_oracles(made.recording), None))
     driven = {case.pipeline: case.driven.outputs for case in cases if case.driven is not None}
-    views = pair_views(captured.recording, driven)
+    views = pair_views(made.recording, driven)
     clock.lap("oracle and views")
-    bad = [receipt for receipt in found if receipt.status == MISMATCH]
-    return JobResult(
-        job=job,
-        scenario=staged.scenario,
-        faults=staged.faults,
-        shake=shake_words(captured.drawn, staged.system.duration_s),
-        receipts=found,
-        cases=tuple(_spoiled(case, bad) if bad else case for case in cases),
-        views=views,
-        timings_s=clock.laps,
-    )
+    bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
+    return tuple(_spoiled(case, bad) if bad else case for case in cases), views
 
 
-def run_case(name: str, captured: Captured) -> Case:
+@runtime_checkable
+class HasRecording(Protocol):
+    """Whatever holds a recording."""
+
+    @property
+    def recording(self) -> Recording: ...
+
+
+def run_case(name: str, made: HasRecording) -> Case:
     """One pipeline on one recording; what it does wrong is its status, never ours."""
-    recording = captured.recording
+    recording = made.recording
     try:
         pipeline = load_pipeline(name)()
         driven = drive(pipeline, recording.calibration, recording.categories, recording.messages)
     except Exception as error:  # a user's pipeline may raise anything
         return failed(name, "pipeline_error", _last_line(error))
     try:
-        return scored(name, score(recording, driven.outputs, driven.trajectories), driven)
+        return scored(name, score_objects(recording, driven.outputs, driven.trajectories), driven)
     except ContractError as error:
         return failed(name, "pipeline_error", str(error))
 

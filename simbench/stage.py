@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path as FilePath
 
 from fusion.messages import CategorySize
 from scenarios.categories import CATEGORY_SIZES, SIZE_SPREAD
@@ -13,9 +14,11 @@ from scenarios.errors import Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments
 from scenarios.load import Family, load_scenario
 from scenarios.scenario import Scenario, System
+from simbench.calibration.file import read_calibration, told
 from simbench.capture import Captured, capture
 from simbench.case import Job
 from simbench.plugins import reads_images
+from simbench.recording import Recording
 from simbench.sensors.pictures import TakePicture, by_gl, by_rays
 from simbench.sensors.render import Renderer
 from simbench.sensors.rig import SensorRig, assemble, resized
@@ -80,6 +83,16 @@ def set_stage(
 def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captured:
     """Run the sensors of a staged job."""
     return capture(staged.system, staged.rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+
+
+def as_told(job: Job, staged: Stage, recording: Recording) -> Recording:
+    """The same recording with the calibration that the job's pipelines are told: the true one, or a found
+    one with whatever a fault does to it on top. The receipts prove the fault before. Raises BadInput."""
+    if job.found_in is None:
+        return recording
+    true = staged.rig.calibration
+    found = read_calibration(FilePath(job.found_in), staged.rig)
+    return replace(recording, calibration=told(recording.calibration, true, found))
 
 
 @contextmanager

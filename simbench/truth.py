@@ -106,7 +106,11 @@ class GnssReference:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truth:
-    """Everything that scores need. `target_id` is None in a scenario without a target."""
+    """Everything that scores need. `target_id` is None in a scenario without a target.
+
+    `targets`: where several objects are scored, each on its own, all of them (recorded data: every labelled
+    object); empty: `target_id` only.
+    """
 
     objects: tuple[ObjectInfo, ...]
     target_id: int | None
@@ -116,6 +120,7 @@ class Truth:
     poses: PoseSource
     reference: GnssReference | None
     period_ns: int  # of the LiDAR
+    targets: tuple[int, ...] = ()
 
     def target_centre_ego_m(self, t_ns: Int64[np.ndarray, " n"]) -> Float64[np.ndarray, "n 3"]:
         """Centre of the target's box in the ego reference frame at t_ns."""

@@ -18,7 +18,7 @@ from simbench.exhibit import PairView
 from simbench.score.mapping import PairScore
 
 BASELINE, METHOD = "static_projection", "probabilistic"
-Key = tuple[int, str]  # scan sequence number, camera
+Key = tuple[int, str, int]  # scan sequence number, camera, which of several targets
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,7 +125,7 @@ def mean_of_runs(group: Group, side: str, pipeline: str | None, metric: str) -> 
 
 
 def views_of(result: JobResult | None) -> Mapping[Key, PairView]:
-    return {} if result is None else {(v.scan_seq, v.camera): v for v in result.views}
+    return {} if result is None else {(v.scan_seq, v.camera, v.target): v for v in result.views}
 
 
 def pairs_of(result: JobResult | None, pipeline: str | None) -> Mapping[Key, PairScore]:
@@ -133,7 +133,7 @@ def pairs_of(result: JobResult | None, pipeline: str | None) -> Mapping[Key, Pai
     case = case_of(result, pipeline)
     if case is None or case.scores is None:
         return {}
-    return {(p.scan_seq, p.camera): p for p in case.scores.pairs}
+    return {(p.scan_seq, p.camera, p.target): p for p in case.scores.pairs}
 
 
 @dataclass(frozen=True, kw_only=True)

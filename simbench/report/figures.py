@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
@@ -29,6 +29,7 @@ from simbench.report.choose import (
 from simbench.report.paper import TABLE_II
 from simbench.report.words import percent, pipeline_words, signed_m
 from simbench.score.budget import PARTS
+from simbench.score.localization import Fix, FrameScore
 
 COLUMN = 400.0  # user units
 PAD, GAP = 4 / 72, 0.04  # inches; share of a subplot
@@ -219,18 +220,19 @@ def birds_eye(result: JobResult, pipeline: str, like: Sequence[str]) -> Markup |
     def draw(figure: Any) -> None:
         axes = figure.subplots()
         _grid(axes, "both")
-        axes.plot(truth[:, 0], truth[:, 1], "-", lw=5, color=palette.RULE, label="truth", zorder=1)
+        _true_paths(axes, frames)
         lost = 0
-        for stage, style in (
-            ("raw", {"marker": "o", "ls": "", "ms": 3.6, "mec": "none", "alpha": 0.75}),
-            ("smooth", {"ls": "-", "lw": 1.6}),
-        ):
+        stages: list[tuple[str, dict[str, Any]]] = [
+            ("raw", {"marker": "o", "ls": "", "ms": 3.6, "mec": "none", "alpha": 0.75})
+        ]
+        if len({f.scan_seq for f in frames}) > 1:  # of one scan there is no trajectory
+            stages.append(("smooth", {"ls": "-", "lw": 1.6}))
+        for stage, style in stages:
             fixes = [f.raw if stage == "raw" else f.smooth for f in frames]
             known = np.array([f.position_ego_m[:2] for f in fixes if f is not None]).reshape(-1, 2)
             colour = palette.RAW if stage == "raw" else palette.METHOD
-            axes.plot(
-                known[:, 0], known[:, 1], color=colour, label=f"{stage} ({len(known)})", zorder=2, **style
-            )
+            for xy, label in _by_target(frames, fixes, f"{stage} ({len(known)})"):
+                axes.plot(xy[:, 0], xy[:, 1], color=colour, label=label, zorder=2, **style)
             if stage == "raw":
                 lost = int((~_within(known, x_range, y_range)).sum())
         axes.set_xlim(*x_range)
@@ -251,6 +253,25 @@ def birds_eye(result: JobResult, pipeline: str, like: Sequence[str]) -> Markup |
             )
 
     return _draw(COLUMN, 168.0, f"Bird's-eye view of {pipeline_words(pipeline)}", draw)
+
+
+def _true_paths(axes: Any, frames: Sequence[FrameScore]) -> None:
+    """Where the target truly was: a line per target, a dot for one that is seen once."""
+    for number, target in enumerate(dict.fromkeys(f.target for f in frames)):
+        path = np.array([f.true_centre_ego_m for f in frames if f.target == target])
+        style = {"ls": "-", "lw": 5} if len(path) > 1 else {"ls": "", "marker": "o", "ms": 9}
+        axes.plot(
+            path[:, 0], path[:, 1], color=palette.RULE, label="_" if number else "truth", zorder=1, **style
+        )
+
+
+def _by_target(
+    frames: Sequence[FrameScore], fixes: Sequence[Fix | None], label: str
+) -> Iterator[tuple[np.ndarray, str]]:
+    """Positions [n 2] of each target, the first with a label for the legend."""
+    for number, target in enumerate(dict.fromkeys(f.target for f in frames)):
+        its = [x.position_ego_m[:2] for f, x in zip(frames, fixes, strict=True) if x and f.target == target]
+        yield np.array(its).reshape(-1, 2), "_" if number else label
 
 
 def _within(xy: np.ndarray, x: tuple[float, float], y: tuple[float, float]) -> np.ndarray:
@@ -330,7 +351,8 @@ def budget_bars(
 
 
 def tpr_over_frames(group: Group, run: Run) -> Markup | None:
-    """TPR of each scan (mean over its pairs) against time, one run. None where nothing was scored."""
+    """TPR of each scan (mean over its pairs) against time, one run. None where nothing was scored, or where a
+    recording is one scan only."""
     wanted = [
         ("faulted", group.baseline, palette.RAW, "-"),
         ("faulted", group.method, palette.METHOD, "-"),
@@ -347,7 +369,7 @@ def tpr_over_frames(group: Group, run: Run) -> Markup | None:
             share = [100.0 * float(np.mean(found[t])) for t in at]
             words = f"{'error' if side == 'faulted' else 'no error'}, {pipeline_words(pipeline, short=True)}"
             curves.append((np.array(at) * 1e-9, share, colour, line, words))
-    if not curves:
+    if not curves or all(len(t) < 2 for t, *_ in curves):
         return None
 
     def draw(figure: Any) -> None:

@@ -15,6 +15,8 @@ from scenarios.errors import BadInput
 from simbench.case import Images, Job, JobResult
 from simbench.exhibit import PairView
 from simbench.files import write_text
+from simbench.formats.kitti import is_recorded
+from simbench.formats.scene import RecordedScene
 from simbench.report import figures, palette, tables
 from simbench.report.choose import (
     Group,
@@ -25,8 +27,9 @@ from simbench.report.choose import (
     pairs_of,
     views_of,
 )
+from simbench.report.objects import MOST_LINES, object_tables
 from simbench.report.overlay import Marks, common_field, crop_svg, cut, jpeg_uri, marks_of
-from simbench.report.pictures import Replay, explain_view, take_pictures
+from simbench.report.pictures import Replayed, explain_view, replay_of, take_pictures
 from simbench.report.video import find_video, poster_uri
 from simbench.report.words import (
     counted,
@@ -37,7 +40,6 @@ from simbench.report.words import (
     points,
     runs_words,
     sentence,
-    stamp_words,
 )
 from simbench.score.statistics import MIN_RUNS
 
@@ -57,6 +59,19 @@ NOT_SHOWN = (
     "the oracle is a ceiling for recall, not for TPR.",
 )
 
+RECORDED_NOT_SHOWN = (
+    "Truth is by hand: labelled boxes have errors of a decimetre or two, a point inside a box counts as the "
+    "object's (some of the ground below it too), and what is not labelled is no object.",
+    "Boxes are the labels' own unless the detector model was asked for: no network was run.",
+    "Visible shares come from the labels' levels of occlusion, and no firing time of a point was stored: all "
+    "points of a sweep count as fired at its stamp.",
+    "Frames of the object layout are independent: no track, no trajectory, nothing smoothed.",
+)
+RECORDED_STILLS: Mapping[Images, str] = {
+    "none": "",
+    "raycast": "Pictures are the recorded ones.",
+    "gl": "Pictures are the recorded ones.",
+}
 STILLS: Mapping[Images, str] = {
     "none": "",
     "raycast": "Pictures are finer than the camera's, in colour, without noise, blur, JPEG.",
@@ -133,6 +148,7 @@ def write_report(
     if not results:
         raise ValueError("a report needs at least one result")
     groups = groups_of(results)
+    recorded = all(is_recorded(r.job.scenario) for r in results)
     sections = tuple(
         _section(group, number, images=images, out=out) for number, group in enumerate(groups, start=1)
     )
@@ -147,12 +163,14 @@ def write_report(
         definitions=tables.DEFINITIONS,
         receipts=tables.receipt_lines(results),
         failed=[(r, c) for r in results for c in r.cases if c.status != "ok"],
-        not_shown=_not_shown(groups, images),
+        not_shown=_not_shown(groups, images, recorded),
+        objects=object_tables(results),
+        most_lines=MOST_LINES,
         environment=_flat(environment),
         seeds=", ".join(str(s) for s in sorted({r.job.seed for r in results})),
         command=command,
         images=images,
-        stills=STILLS[images],
+        stills=RECORDED_STILLS[images] if recorded else STILLS[images],
         c=palette,
     )
     path = out / "report.html"
@@ -180,15 +198,17 @@ def _template() -> Any:
     return made.get_template("page.html.j2")
 
 
-def _not_shown(groups: Sequence[Group], images: Images) -> tuple[str, ...]:
+def _not_shown(groups: Sequence[Group], images: Images, recorded: bool) -> tuple[str, ...]:
     few = min(len(group.runs) for group in groups) < MIN_RUNS
     first = (
         (f"{runs_words(groups)}. No intervals, no p-values: other seeds may look different.",) if few else ()
     )
     scenarios = counted(len({g.scenario for g in groups}), "scenario")
     last = (f"{scenarios} of the catalogue: the numbers are about these, not about traffic.",)
+    if recorded:
+        last = ("The numbers are about these recordings, not about traffic.",)
     plain = ("No pictures were rendered: points stand on a plain ground.",) if images == "none" else ()
-    return (*first, *NOT_SHOWN, *last, *plain)
+    return (*first, *(RECORDED_NOT_SHOWN if recorded else NOT_SHOWN), *last, *plain)
 
 
 def _flat(environment: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:
@@ -220,7 +240,7 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
         over_frames = figures.tpr_over_frames(group, run)
         try:
             replays = _Replays(group, chosen, images)
-            stamps = stamp_words(tuple(replays.of(shown).staged.rig.cameras.values()))
+            stamps = replays.of(shown).stamps
             median = _shot(group, chosen[0], "median", replays)
             worst = _shot(group, chosen[1], "largest", replays)
             modes, shapes, explained = _explained(group, chosen[0], replays)
@@ -270,18 +290,18 @@ class _Replays:
                 if result is not None:
                     view = views_of(result)[instant.key]
                     wanted.setdefault(result.job, []).append((view.camera, view.capture_ns))
-        self._made = {job: Replay(job) for job in wanted}
+        self._made = {job: replay_of(job) for job in wanted}
         self._taken = (
             {job: take_pictures(self._made[job], keys, images, SHARPER) for job, keys in wanted.items()}
             if images != "none"
             else {}
         )
 
-    def of(self, result: JobResult) -> Replay:
+    def of(self, result: JobResult) -> Replayed:
         return self._made[result.job]
 
     def camera(self, result: JobResult, view: PairView) -> PinholeCamera:
-        return self.of(result).staged.rig.pinholes[view.camera]
+        return self.of(result).pinholes[view.camera]
 
     def picture(self, result: JobResult, view: PairView, field: BoxPx) -> str | None:
         """The field's picture as data URI; None where no pictures are wanted."""
@@ -309,7 +329,8 @@ def _shot(group: Group, instant: Instant, which: str, replays: _Replays) -> Shot
     crops = tuple(
         _crop(instant, side, name, marks[side, name], field, pictures[side]) for side, name in wanted
     )
-    return Shot(caption=_caption(group, instant, which, views[group.main_side]), crops=crops)
+    caption = _caption(group, instant, which, results[group.main_side], views[group.main_side])
+    return Shot(caption=caption, crops=crops)
 
 
 def _crop(
@@ -328,8 +349,12 @@ def _crop(
     return Crop(title=title, note=note, svg=crop_svg(marks, field, picture, f"{title}: {note}"))
 
 
-def _caption(group: Group, instant: Instant, which: str, view: PairView) -> str:
+def _caption(group: Group, instant: Instant, which: str, result: JobResult, view: PairView) -> str:
     where = f"{group.system}, {view.camera}, t = {1e-9 * view.scan_stamp_ns:.1f} s, seed {instant.run.seed}"
+    if isinstance(result.scenario, RecordedScene):
+        where = f"{result.scenario.objects[view.target].name}, {view.camera}"
+        if result.scenario.sweeps > 1:
+            where += f", t = {1e-9 * view.scan_stamp_ns:.1f} s"
     if instant.loss is None:
         rank = "median" if which == "median" else "lowest"
         what = f"Pair of {rank} TPR of the {pipeline_words(group.baseline)}"

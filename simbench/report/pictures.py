@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import replace
 from typing import Protocol, runtime_checkable
 
@@ -16,7 +16,7 @@ from fusion.clustering import ClusteringConfig
 from fusion.explain import AoiExplanation, explain_aoi
 from fusion.ground import GroundConfig, remove_ground
 from fusion.localize import planar_distance_m
-from fusion.messages import CategorySize, Detection, LidarScan
+from fusion.messages import Calibration, CategorySize, Detection, LidarScan
 from fusion.shape import BenchmarkShapes, ShapeConfig
 from fusion.timing import StepClock
 from scenarios.seeding import stream
@@ -24,8 +24,11 @@ from simbench.capture import set_in_motion
 from simbench.case import Images, Job
 from simbench.exhibit import PairView
 from simbench.faults.draw import Drawn, draw
+from simbench.formats.kitti import is_recorded
 from simbench.motion import Motion, at
 from simbench.plugins import load_pipeline
+from simbench.report.recorded import RecordedReplay
+from simbench.report.words import stamp_words
 from simbench.sensors import lidar
 from simbench.sensors.camera import take
 from simbench.sensors.render import Renderer
@@ -34,6 +37,47 @@ from simbench.stage import CATEGORIES, Stage, stage
 
 LARGEST_PX = 2048  # along a picture's longer side: OpenGL's buffer
 FOR_THE_READER = {"monochrome": False, "motion_blur_samples": 1, "noise": None, "jpeg_quality": None}
+
+
+@runtime_checkable
+class Takes(Protocol):
+    """Gives the picture that a camera took at a true time."""
+
+    def take(self, camera: str, capture_ns: int) -> UInt8[np.ndarray, "h w 3"]: ...
+
+
+@runtime_checkable
+class Replayed(Protocol):
+    """A job made again, simulated or recorded: what pictures and figures need of it.
+
+    told, categories: what the fusion was told. stamps: what a reader must know of late stamps.
+    """
+
+    @property
+    def pinholes(self) -> Mapping[str, PinholeCamera]: ...
+
+    @property
+    def told(self) -> Calibration: ...
+
+    @property
+    def categories(self) -> Mapping[str, CategorySize]: ...
+
+    @property
+    def rate_hz(self) -> float: ...
+
+    @property
+    def stamps(self) -> str: ...
+
+    def category_of(self, view: PairView) -> str: ...
+
+    def scan(self, seq: int) -> LidarScan: ...
+
+    def camera(self, images: Images, sharper: int = 1) -> AbstractContextManager[Takes]: ...
+
+
+def replay_of(job: Job) -> Replayed:
+    """The job again. Raises BadInput where its scenario or its files are not there any more."""
+    return RecordedReplay(job) if is_recorded(job.scenario) else Replay(job)
 
 
 class Replay:
@@ -46,6 +90,36 @@ class Replay:
         self.seed = job.seed
         self.drawn: Drawn = draw(rig, self.staged.world, self.staged.faults, timing, system, job.seed)
         self.motion: Motion = set_in_motion(self.staged.world, rig, system.ego, self.drawn)
+
+    @property
+    def pinholes(self) -> Mapping[str, PinholeCamera]:
+        """The cameras as they are."""
+        return self.staged.rig.pinholes
+
+    @property
+    def told(self) -> Calibration:
+        """What the fusion was told."""
+        return self.drawn.told
+
+    @property
+    def categories(self) -> Mapping[str, CategorySize]:
+        """Mean sizes that the fusion was told."""
+        return CATEGORIES
+
+    @property
+    def rate_hz(self) -> float:
+        """Of the LiDAR."""
+        return self.staged.rig.lidar.rate_hz
+
+    @property
+    def stamps(self) -> str:
+        """What a reader must know of late stamps."""
+        return stamp_words(tuple(self.staged.rig.cameras.values()))
+
+    def category_of(self, view: PairView) -> str:
+        """Of the target. KeyError: the scenario has none."""
+        system = self.staged.system
+        return system.actors[system.target or ""].category
 
     def scan(self, seq: int) -> LidarScan:
         """Scan `seq` exactly as it was delivered."""
@@ -100,7 +174,7 @@ def magnified(camera: PinholeCamera, sharper: int) -> PinholeCamera:
 
 
 def take_pictures(
-    replay: Replay, wanted: Sequence[tuple[str, int]], images: Images, sharper: int = 1
+    replay: Replayed, wanted: Sequence[tuple[str, int]], images: Images, sharper: int = 1
 ) -> dict[tuple[str, int], UInt8[np.ndarray, "h w 3"]]:
     """Pictures for a list of (camera, capture_ns)."""
     with replay.camera(images, sharper) as taker:
@@ -137,14 +211,13 @@ class SixSteps(Protocol):
     shapes: BenchmarkShapes
 
 
-def explain_view(replay: Replay, view: PairView, pipeline: str) -> AoiExplanation | None:
+def explain_view(replay: Replayed, view: PairView, pipeline: str) -> AoiExplanation | None:
     """Steps 1 to 4 on the target's delivered box. None without a box, or where the pipeline
     has not the six steps."""
     steps = load_pipeline(pipeline)()
-    target = replay.staged.system.target
-    if not isinstance(steps, SixSteps) or view.box_px is None or target is None:
+    if not isinstance(steps, SixSteps) or view.box_px is None:
         return None
-    config, told, category = steps.config, replay.drawn.told, replay.staged.system.actors[target].category
+    config, told, category = steps.config, replay.told, replay.category_of(view)
     camera = told.cameras[view.camera]
     aoi_px = clip(enlarge(view.box_px, config.aoi), camera)
     if aoi_px is None:
@@ -154,7 +227,7 @@ def explain_view(replay: Replay, view: PairView, pipeline: str) -> AoiExplanatio
     T_camera_lidar = told.T_camera_lidar(view.camera, scan.sensor)
     (inside,) = map_into_boxes(np.ascontiguousarray(scan.xyz_m[kept].T), T_camera_lidar, camera, [aoi_px])
     points = kept[inside.points]
-    entry = config.of(category, dict(CATEGORIES))
+    entry = config.of(category, dict(replay.categories))
     return explain_aoi(
         camera=view.camera,
         detection=Detection(track_id=0, category=category, box_px=view.box_px, confidence=1.0),

@@ -18,6 +18,7 @@ from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
 from simbench.case import Images, JobResult
 from simbench.exhibit import PairView
+from simbench.formats.kitti import is_recorded
 from simbench.report import palette
 from simbench.report.choose import Group, groups_of, pairs_of, shift_px
 from simbench.report.overlay import (
@@ -31,7 +32,7 @@ from simbench.report.overlay import (
     thinned,
     within,
 )
-from simbench.report.pictures import Replay
+from simbench.report.pictures import Replayed, replay_of
 from simbench.report.words import NONE, fault_words, percent, pipeline_words
 
 SLOWED = 4
@@ -59,10 +60,16 @@ def write_video(result: JobResult, out: Path, images: Images = "raycast") -> Pat
     if not result.views:
         raise ValueError("a video needs at least one scan with the target in view")
     path = out / video_name(result.scenario.name, result.job.system, result.job.seed)
-    replay = Replay(result.job)
-    rate_hz = Fraction(replay.staged.rig.lidar.rate_hz).limit_denominator(1000) / SLOWED
+    replay = replay_of(result.job)
+    rate_hz = Fraction(replay.rate_hz).limit_denominator(1000) / SLOWED
     encode(frames(result, replay, images), path, rate_hz)
     return path
+
+
+def moves(result: JobResult) -> bool:
+    """Whether a video shows more than a picture: several scans with a target, or a simulated drive."""
+    scans = {view.scan_seq for view in result.views}
+    return len(scans) > (1 if is_recorded(result.job.scenario) else 0)
 
 
 def encode(pictures: Iterator[UInt8[np.ndarray, "h w 3"]], path: Path, rate_hz: Fraction) -> None:
@@ -109,12 +116,12 @@ def _area(view: PairView) -> float:
     return (x1 - x0) * (y1 - y0)
 
 
-def frames(result: JobResult, replay: Replay, images: Images) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
+def frames(result: JobResult, replay: Replayed, images: Images) -> Iterator[UInt8[np.ndarray, "h w 3"]]:
     """The pictures of the video, one after another."""
     (group,) = groups_of([result])
     names = [name for name in (group.baseline, group.method) if name is not None]
     views = shown_views(result.views)
-    pinholes = replay.staged.rig.pinholes
+    pinholes = replay.pinholes
     marks = [{name: marks_of(v, name, pinholes[v.camera]) for name in names} for v in views]
     fields = _steady(
         [
@@ -131,7 +138,7 @@ def frames(result: JobResult, replay: Replay, images: Images) -> Iterator[UInt8[
             ground = cut(picture, field, pinholes[view.camera].width_px, PANEL_PX[0])
             panels = [
                 (
-                    _heading(name, tpr[name].get((view.scan_seq, view.camera))),
+                    _heading(name, tpr[name].get((view.scan_seq, view.camera, view.target))),
                     paint(ground, drawn[name], field),
                 )
                 for name in names

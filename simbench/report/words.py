@@ -144,7 +144,10 @@ def _compared(groups: Sequence[Group]) -> str:
         x = mean_of_runs(group, "faulted", group.baseline, "mae_m.raw")
         y = mean_of_runs(group, "faulted", group.method, "mae_m.raw")
         extra = "" if without is None else f"; {percent(without)} % without the errors"
-        extra += "; no position" if y is None else f"; position error {metres(x)} → {metres(y)} m"
+        if y is not None:
+            extra += f"; position error {metres(x)} → {metres(y)} m"
+        elif not mean_of_runs(group, "faulted", group.method, "coverage.raw"):
+            extra += "; no position"
         gains.append(f"{percent(c)} % {_on(group, groups)} ({points(c - b)}{extra})")
     text = f"{cause} {joined(costs)}"
     method = groups[0].method

@@ -63,7 +63,7 @@ class Fix:
 @dataclass(frozen=True, kw_only=True)
 class FrameScore:
     """One eligible frame. `camera`, `track_id`: of the raw position; `hit`: it rests on a point on the
-    target.
+    target. `target`: which of several targets, by its place among them.
     """
 
     frame: int
@@ -77,6 +77,7 @@ class FrameScore:
     track_id: int | None
     hit: bool
     smooth: Fix | None
+    target: int = 0
 
 
 def _vector(row: np.ndarray) -> Vector:
@@ -200,6 +201,16 @@ def localization_estimates(truth: Truth, frames: Sequence[FrameScore]) -> Mappin
     """Every metric of `metrics.LOCALIZATION` by name."""
     if truth.target_id is None:
         return {metric.name: null("the scenario has no target") for metric in LOCALIZATION}
+    return {
+        **frame_estimates(frames),
+        "lateral_clearance_error_m": _lateral_clearance(frames),
+        "ttc_error_s": _ttc(truth, frames),
+        "time_to_first_valid_s": _time_to_first_valid(frames),
+    }
+
+
+def frame_estimates(frames: Sequence[FrameScore]) -> dict[str, Estimate]:
+    """The metrics that count frames alike, of whatever object: errors, coverage, gross errors."""
     estimates: dict[str, Estimate] = {}
     for stage in ("raw", "smooth"):
         for reference in ("", ".gnss"):
@@ -220,9 +231,6 @@ def localization_estimates(truth: Truth, frames: Sequence[FrameScore]) -> Mappin
         error_m = None if frame.smooth is None else frame.smooth.error_m()
         gross.append(error_m is None or float(planar_range_m(error_m)) > GROSS_M)
     estimates["gross_rate.smooth"] = mean_of(gross, of="eligible frames", spread=False)
-    estimates["lateral_clearance_error_m"] = _lateral_clearance(frames)
-    estimates["ttc_error_s"] = _ttc(truth, frames)
-    estimates["time_to_first_valid_s"] = _time_to_first_valid(frames)
     return estimates
 
 

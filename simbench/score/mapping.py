@@ -44,7 +44,8 @@ class PairScore:
 
     n_window*: mapped points within the window around the surface, centre and GNSS distance (GNSS: None before
     its first fix). n_correct: mapped points that hit the target. n_true: the target's true points in this
-    image; n_found: those that were mapped. hit: the representative lies in the target's grown box.
+    image; n_found: those that were mapped. hit: the representative lies in the target's grown box. target:
+    which of several targets, by its place among them.
     """
 
     frame: int
@@ -63,6 +64,7 @@ class PairScore:
     n_true: int
     n_found: int
     hit: bool
+    target: int = 0
 
     def _share(self, count: int) -> float:
         return count / self.n_mapped if self.n_mapped else 0.0

@@ -18,16 +18,39 @@ from simbench.score.metrics import METRICS, Metric, Row, rows_of
 from simbench.score.pairs import frames_and_pairs
 
 
+@dataclass(frozen=True, kw_only=True)
+class ObjectScore:
+    """One object of a recording, over all of its eligible pairs and frames.
+
+    distance_m: the box centre's smallest planar distance from the LiDAR while it was in an image. points: its
+    most points in one sweep. planar_m: mean planar error of the positions, None where there is none. why: why
+    it is not scored, None where it is.
+    """
+
+    name: str
+    category: str
+    distance_m: float | None
+    points: int
+    visible_fraction: float
+    pairs: int
+    hits: int
+    tpr: float | None
+    positions: int
+    planar_m: float | None
+    why: str | None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Scores:
     """`rows`: one per metric of `METRICS`, in its order. `budget` is None without target or GNSS
-    reference.
+    reference. `objects`: where several objects are scored (`objects.py`), each of them.
     """
 
     rows: tuple[Row, ...]
     pairs: tuple[PairScore, ...]
     frames: tuple[FrameScore, ...]
     budget: Budget | None
+    objects: tuple[ObjectScore, ...] = ()
 
     def __getitem__(self, metric: str) -> Row:
         """The row of a metric; KeyError with the known names."""
