@@ -122,7 +122,7 @@ def courses(
     name: str, motion: Motion, table: BeamTable, start_ns: Int64[np.ndarray, " n"]
 ) -> tuple[Course, ...]:
     """Those of several sweeps of sensor `name` that start at true times start_ns: quicker than one by one."""
-    key_ns, instants = _keys(table)[0], table.group_offset_ns
+    key_ns, instants = _keys(table, COLUMNS_PER_KEY)[0], table.group_offset_ns
     rotation, origin = motion.sensor(name, (start_ns[:, None] + instants).ravel())
     body_rotation, body_position = motion.poses((start_ns[:, None] + key_ns).ravel())
     sweeps = len(start_ns)
@@ -149,7 +149,7 @@ def aim(
     errors, to first order. course: that of this sweep, where it is known already."""
     if course is None:
         course = courses(name, motion, table, np.array([start_ns]))[0]
-    _, key, weight = _keys(table)
+    _, key, weight = _keys(table, COLUMNS_PER_KEY)
     fans = table.fans
     if sd_rad > 0.0:
         slope, skew = fans.slope.copy(), fans.skew.copy()
@@ -176,11 +176,12 @@ def aim(
 @lru_cache(maxsize=8)
 def _keys(
     table: BeamTable,
+    columns_per_key: int,
 ) -> tuple[Int64[np.ndarray, " t"], Int64[np.ndarray, " g"], Float64[np.ndarray, " g"]]:
     """Times of key poses from the sweep's start, the last at or after the last firing; of each group, the key
     before it and how far it is on the way to the next."""
     fire_ns = table.group_offset_ns
-    key_ns = table.column_offset_ns[::COLUMNS_PER_KEY]
+    key_ns = table.column_offset_ns[::columns_per_key]
     if key_ns[-1] < fire_ns[-1]:
         key_ns = np.append(key_ns, fire_ns[-1])
     key = np.searchsorted(key_ns, fire_ns, side="right") - 1

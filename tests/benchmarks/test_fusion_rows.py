@@ -26,7 +26,6 @@ def test_every_answer_but_those_of_the_warm_up_is_counted() -> None:
     assert found.answers >= fusion_rows.WARM_UP + 1
     assert 0.0 < found.p50_ms <= found.p99_ms
     assert set(found.steps_ms) == {"ground", "aoi", "localize"}
-    assert sum(found.steps_ms.values()) < 1.5 * found.p50_ms
     assert found.peak_mb > 0.1
 
 
