@@ -1,0 +1,36 @@
+"""How likely an object's points are its own: a logistic function of what is known when it is given.
+
+    p = 1 / (1 + exp(-(bias + a score + b min(support, 1) + c ln points + d ln min(sightings, 10))))
+
+The weights are fitted (maximum likelihood) so that of the objects given p a share of p is right, an object
+being right if half of its points or more belong to what its box shows. The detector's own confidence is not
+used.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConfidenceConfig:
+    """The weights. Fitted on 17 774 objects of 32 drives of the overtaking scenarios, seeds 100 to 103."""
+
+    bias: float = -0.08
+    score: float = 0.63  # log-score of the cluster in its boxes, at most 0
+    support: float = 1.3  # share of the last scans that its motion explains
+    points: float = 1.62
+    sightings: float = 0.38  # of its track so far
+
+
+def confidence(score: float, support: float, points: int, sightings: int, config: ConfidenceConfig) -> float:
+    """The chance (0..1) that the points are the object's."""
+    x = (
+        config.bias
+        + config.score * score
+        + config.support * min(support, 1.0)
+        + config.points * math.log(max(points, 1))
+        + config.sightings * math.log(min(sightings, 10))
+    )
+    return 1.0 / (1.0 + math.exp(-min(max(x, -30.0), 30.0)))
