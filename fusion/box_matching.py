@@ -60,22 +60,23 @@ def match_boxes(
     the image. ValueError: a category without size.
     """
     T_camera_scene = frame.T_camera_scene(camera_name, stamp_ns, scene.pose) if usable else None
-    groups: dict[str, list[int]] = {}
-    for place, (detection, _) in enumerate(usable):
-        groups.setdefault(detection.category, []).append(place)
+    sizes_of = [size_of(detection.category, sizes) for detection, _ in usable]
+    groups: dict[bool, list[int]] = {}
+    for place, size in enumerate(sizes_of):
+        groups.setdefault(is_figure(size, track_config.surface), []).append(place)
     fits: dict[int, BoxFit] = {}
-    for category, places in groups.items():
+    for figure, places in groups.items():
         assert T_camera_scene is not None
-        size = size_of(category, sizes)
-        clusters = scene.fine if is_figure(size, track_config.surface) else scene.coarse
+        clusters = scene.clusters(figure)
         boxes_px = [usable[place][1] for place in places]
+        expected = [sizes_of[place] for place in places]
         view = view_clusters(
             clusters,
             scene.xyz_m,
             T_camera_scene,
             camera,
             boxes_px,
-            config.largest * math.hypot(*size.mean_m[:2]),
+            config.largest * max(math.hypot(*size.mean_m[:2]) for size in expected),
             config.candidates,
         )
         moved_m = np.stack(
@@ -88,7 +89,7 @@ def match_boxes(
             view,
             clusters,
             boxes_px,
-            size,
+            expected,
             moved_m @ T_camera_scene.rotation.T,
             scene.beams_per_sr,
             config.candidates,
@@ -98,7 +99,7 @@ def match_boxes(
         MatchedBox(
             camera=camera_name,
             detection=detection,
-            size=size_of(detection.category, sizes),
+            size=sizes_of[place],
             fit=fits[place],
             sd_rad=(
                 config.sd_rad + config.sd_share * (box_px[2] - box_px[0]) / camera.fx_px,

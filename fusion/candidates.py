@@ -10,7 +10,6 @@ one bad term (an occluded half, a missing wheel) does not outweigh all others.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,21 +116,22 @@ def fit_boxes(
     view: View,
     clusters: Clusters,
     boxes_px: list[BoxPx],
-    size: CategorySize,
+    sizes: list[CategorySize],
     moved_m: Float64[np.ndarray, "b 3"],
     beams_per_sr: float | None,
     config: CandidateConfig,
 ) -> list[BoxFit]:
-    """The candidates of every box [b] of one category: the clusters within reach of it.
+    """The candidates of every box [b], given the size of what it shows: the clusters within reach of it.
 
     moved_m: by how much each object moved from the LiDAR's instant to the image's, camera frame.
     beams_per_sr: density of the LiDAR's beams; None: clusters of few points are as good as others.
     """
     camera = view.camera
-    length_m, width_m, height_m = size.mean_m
+    length_m, width_m, height_m = np.array([size.mean_m for size in sizes]).T[:, :, None]
     boxes = np.array(boxes_px, dtype=np.float64).reshape(-1, 4, 1)
     x0, y0, x1, y1 = boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3]
-    top_px = camera.project(view.foot_m + height_m * view.up)
+    top_m = view.foot_m + height_m[:, :, None] * view.up
+    top_px = camera.project(top_m.reshape(-1, 3)).reshape((*top_m.shape[:2], 2))
     # How far the motion moves the foot in the image, without the lens's distortion: [b m].
     depth_m = np.maximum(view.foot_m[:, 2], 0.5)
     ahead_m = np.maximum(depth_m + moved_m[:, 2:], 0.5)
@@ -139,13 +139,13 @@ def fit_boxes(
     down_px = camera.fy_px * ((view.foot_m[:, 1] + moved_m[:, 1:2]) / ahead_m - view.foot_m[:, 1] / depth_m)
     left = np.maximum(view.outline_px[:, 0] + right_px, 0.0)
     right = np.minimum(view.outline_px[:, 2] + right_px, camera.width_px)
-    upper = np.clip(top_px[:, 1] + down_px, 0.0, camera.height_px)
+    upper = np.clip(top_px[:, :, 1] + down_px, 0.0, camera.height_px)
     lower = np.clip(view.foot_px[:, 1] + down_px, 0.0, camera.height_px)
     beside = (0.5 * (x0 + x1) - 0.5 * (left + right)) / camera.fx_px
     below = (0.5 * (y0 + y1) - 0.5 * (upper + lower)) / camera.fy_px
     extent_m = clusters.high_m[view.cluster] - clusters.low_m[view.cluster]
     tall = clusters.top_m[view.cluster] / height_m
-    long = extent_m.max(axis=1) / math.hypot(length_m, width_m)
+    long = extent_m.max(axis=1) / np.hypot(length_m, width_m)
     own = (
         _cost((tall - 1.0) / config.top_sd, config.weak_cap)
         + _cost(np.maximum(tall - 1.25, 0.0) / 0.1, config.cap)

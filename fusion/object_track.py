@@ -141,7 +141,7 @@ def heading_of(
     size: CategorySize,
     config: TrackConfig,
 ) -> float:
-    """The heading of an object with points [k]: its way, or where it is slow its sides, near the ego's way."""
+    """The heading of an object with points [k]: its way; where it is slow its sides, near the ego's way."""
     if math.hypot(*velocity_mps) > config.heading_speed_mps:
         return math.atan2(velocity_mps[1], velocity_mps[0])
     if is_figure(size, config.surface):
