@@ -16,7 +16,8 @@ Pixels: the centre of the first one is (0.5, 0.5). Nothing here knows how pictur
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import cv2
@@ -178,9 +179,10 @@ def find_intrinsics(
         )
     world = [board.inner_m.astype(np.float32)] * len(corners_px)
     image = [np.asarray(corners, dtype=np.float32) for corners in corners_px]
-    _, matrix, lens, turns, shifts = cv2.calibrateCamera(
-        world, image, size_px, np.eye(3), np.zeros(5), flags=flags
-    )
+    with _one_thread():
+        _, matrix, lens, turns, shifts = cv2.calibrateCamera(
+            world, image, size_px, np.eye(3), np.zeros(5), flags=flags
+        )
     k1, k2, p1, p2, k3 = (float(v) for v in np.ravel(lens)[:5])
     camera = PinholeCamera(
         fx_px=float(matrix[0, 0]), fy_px=float(matrix[1, 1]), cx_px=float(matrix[0, 2]),
@@ -195,6 +197,18 @@ def find_intrinsics(
     shown = np.array([camera.project(pose.apply(board.inner_m)) for pose in poses])
     residual = np.linalg.norm(shown - np.array(corners_px), axis=2)
     return Intrinsics(camera=camera, T_camera_board=poses, residual_px=residual)
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """OpenCV on one thread: its threads add the views' sums in the order in which they end, and the last
+    digits of the camera change from call to call."""
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
 
 
 def _tilt_apart_deg(

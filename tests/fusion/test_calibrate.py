@@ -108,6 +108,14 @@ def test_exact_corners_give_the_exact_camera_and_board_poses(seed: int, focal: f
     np.testing.assert_allclose(clicks, pairs_of(held, mount(), camera).image_px, atol=0.01)
 
 
+def test_the_same_corners_give_the_same_camera_to_the_last_digit() -> None:
+    rng = np.random.default_rng(5)
+    corners = [CAMERA.project(pose.apply(BOARD.inner_m)) for pose in poses(12, rng, radius=0.1)]
+    clicked = [c + 0.1 * rng.standard_normal(c.shape) for c in corners]
+    cameras = {find_intrinsics(clicked, BOARD, (960, 600)).camera for _ in range(30)}
+    assert len(cameras) == 1
+
+
 def test_distortion_is_found_only_where_it_is_asked_for() -> None:
     bent = PinholeCamera(
         fx_px=600.0, fy_px=600.0, cx_px=480.0, cy_px=300.0, width_px=960, height_px=600,
