@@ -11,23 +11,27 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fusion.association import AssociationConfig, CandidateSet, associate, contested
+from fusion.camera import PinholeCamera
 from fusion.confidence import ConfidenceConfig, confidence
 from fusion.deskew import against_motion, deskew, poses_at
 from fusion.footprint import FootprintConfig, cluster_from_above
+from fusion.geometry import Transform, rotation_rpy
 from fusion.kalman import KalmanConfig, correct, local_lines, predict, smooth, smooth_robustly, start
 from fusion.local_ground import LocalGround, LocalGroundConfig, fit_local_ground
-from fusion.messages import CategorySize, EgoMotion
+from fusion.messages import Calibration, CategorySize, EgoMotion
 from fusion.odometry import Odometry, from_odometry, to_odometry
 from fusion.pixel_shift import PixelShiftConfig, Vote, vote_shift
+from fusion.scene import SceneConfig, build_scene
 from fusion.shake import ShakeConfig, yaw_shake_rad
 from fusion.surface_to_centre import SurfaceConfig, box_heading, to_centre
 from fusion.synthetic import Block, beams, cast
-from fusion.working_frame import beam_density
+from fusion.working_frame import WorkingFrame, beam_density
 from tests.fusion.make import lidar_scan
 
 CAR = CategorySize(mean_m=(4.5, 1.8, 1.5), spread=0.08)
 PERSON = CategorySize(mean_m=(0.6, 0.6, 1.75), spread=0.08)
 MS = 1_000_000
+PINHOLE = PinholeCamera(fx_px=500.0, fy_px=500.0, cx_px=480.0, cy_px=300.0, width_px=960, height_px=600)
 
 
 def rng(seed: int) -> np.random.Generator:
@@ -117,6 +121,53 @@ def test_the_wall_that_a_driving_ego_sees_curved_is_flat_again(speed: float, rat
     pose = odometry.pose(np.array([at_ns]))
     assert np.abs(to_odometry(straight, pose)[:, 0] - 40.0).max() < 1e-5
     assert np.abs(to_odometry(seen_m, pose)[:, 0] - 40.0).max() > 0.2
+
+
+@given(speed=st.floats(-15, 15), rate=st.floats(-0.6, 0.6), mount=st.floats(-3, 3), at=st.integers(0, 1_900))
+@settings(max_examples=20)
+def test_what_stands_still_is_where_the_camera_sees_it_at_any_instant(
+    speed: float, rate: float, mount: float, at: int
+) -> None:
+    T_ego_camera = Transform(rotation=rotation_rpy(0.1, -0.2, 0.5), translation_m=np.array([0.5, 0.1, 1.6]))
+    T_ego_lidar = Transform(rotation=rotation_rpy(0, 0, mount), translation_m=np.array([0.0, 0.0, 1.8]))
+    calibration = Calibration(
+        T_ego_sensor={"lidar": T_ego_lidar, "front": T_ego_camera}, cameras={"front": PINHOLE}
+    )
+    frame, ego = WorkingFrame(calibration, "lidar"), driven(speed, rate)
+    for k in range(201):
+        frame.odometry.add(motion(10 * MS * k, speed, rate))
+    post_m = np.array([20.0, 3.0, 1.0])  # in the world, which is the ego frame at 0
+
+    def seen_from_ego(stamp_ns: int) -> np.ndarray:
+        xy_m = from_odometry(post_m[None, :2], ego.pose(np.array([stamp_ns])))[0]
+        return np.array([*xy_m, post_m[2]])
+
+    scan_ns, image_ns = 1_000 * MS, at * MS
+    in_scene = frame.T_ego_work.inverse().apply(seen_from_ego(scan_ns))
+    T_camera_scene = frame.T_camera_scene("front", image_ns, frame.odometry.pose(np.array([scan_ns])))
+    expected = T_ego_camera.inverse().apply(seen_from_ego(image_ns))
+    np.testing.assert_allclose(T_camera_scene.apply(in_scene), expected, atol=1e-6)
+
+
+def test_a_scene_is_as_a_still_world_would_be() -> None:
+    """A wall ahead, swept from right to left in 100 ms by an ego that drives towards it."""
+    calibration = Calibration(
+        T_ego_sensor={"lidar": Transform(rotation=np.eye(3), translation_m=np.array([0.0, 0.0, 1.8]))},
+        cameras={},
+    )
+    frame = WorkingFrame(calibration, "lidar")
+    for k in range(201):
+        frame.odometry.add(motion(10 * MS * k, 12.5))
+    fire_ns = np.arange(1000) * 100_000
+    y_m, z_m = np.linspace(-8.0, 8.0, 1000), np.tile([1.2, 2.0], 500) - 1.8
+    xyz_m = np.column_stack([30.0 - 12.5 * fire_ns * 1e-9, y_m, z_m])
+    scan = lidar_scan(xyz_m, stamp_ns=0, offset_ns=fire_ns)
+    scene = build_scene(scan, frame, SceneConfig())
+    assert len(scene.points) == 1000
+    assert np.ptp(scene.xyz_m[:, 0]) < 1e-3 and np.ptp(scene.xy_odom_m[:, 0]) < 1e-3
+    assert np.abs(scene.xyz_m[:, 0] - (30.0 - 12.5 * scene.at_ns * 1e-9)).max() < 1e-3
+    bent = build_scene(scan, frame, SceneConfig(deskew=False))
+    assert np.ptp(bent.xyz_m[:, 0]) > 1.2
 
 
 def test_poses_between_the_knots_are_as_good_as_exact() -> None:
@@ -356,6 +407,16 @@ def test_three_boxes_or_more_find_the_shift(seed: int, boxes: int, x: float, y: 
 @given(seed=st.integers(0, 10**6), boxes=st.integers(0, 2))
 def test_fewer_boxes_shift_nothing(seed: int, boxes: int) -> None:
     assert vote_shift(votes(np.array([0.05, 0.0]), boxes, seed), PixelShiftConfig()) is None
+
+
+def test_two_boxes_that_agree_do_not_outvote_the_rest() -> None:
+    agree = votes(np.array([0.05, 0.0]), 2, 0, clutter=0)
+    alone = [
+        Vote(track_id=k, offset_rad=np.array([[-0.05, 0.02 * k]]), weight=np.array([0.5])) for k in (3, 5)
+    ]
+    assert vote_shift([*agree, *alone], PixelShiftConfig()) is None
+    third = replace(agree[0], track_id=9)
+    assert vote_shift([*agree, *alone, third], PixelShiftConfig()) is not None
 
 
 def test_three_votes_of_one_track_are_one_box() -> None:
