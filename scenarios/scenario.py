@@ -518,6 +518,7 @@ class DetectorSpec(Spec):
     min_height_px: NonNegative = 12.0
     min_visible_fraction: Annotated[float, Field(ge=0, le=1)] = 0.2
     recall_at_best: Annotated[float, Field(gt=0, le=1)] = 0.99
+    recall_at_least_visible: Annotated[float, Field(gt=0, le=1)] = 0.75  # as a share of that at best
     recall_half_height_px: Positive = 10.0
     miss_burst_frames: Annotated[float, Field(ge=1)] = 2.0  # mean length of a burst of misses
     false_boxes_per_image: NonNegative = 0.02

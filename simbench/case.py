@@ -26,8 +26,8 @@ class Job:
     """What to record and what to run on it. `faults`: as `--faults` gives them, in place of or on top of the
     scenario's own; empty: just those.
 
-    Of recorded data (`kitti:PATH`) the seed is the number of the recording; `boxes` says where detections
-    come from, `frames` which frames of a sequence are played (None: all)."""
+    `boxes`: where detections come from, None: as `boxes_of` says. Of recorded data (`kitti:PATH`) the seed is
+    the number of the recording, and `frames` are those of a sequence that are played (None: all)."""
 
     scenario: str
     system: str
@@ -36,10 +36,16 @@ class Job:
     faults: tuple[str, ...] = ()
     images: Images = "none"
     size_px: tuple[int, int] | None = None
-    boxes: Boxes = "labels"
+    boxes: Boxes | None = None
     frames: tuple[int, int] | None = None
     calibration: str = "true"  # as `--calibration` gives it
     found_in: str | None = None  # the file of the found calibration that the pipelines are told
+
+
+def boxes_of(job: Job, recorded: bool) -> Boxes:
+    """`labels`: the exact visible box of every object; `model`: what the detector model makes of them. What a
+    job does not say: labels of recorded data, the model of a simulated drive."""
+    return job.boxes or ("labels" if recorded else "model")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -168,8 +168,9 @@ def demo(
 )  # fmt: skip
 @click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
 @click.option(
-    "--boxes", type=click.Choice(["labels", "model"]), default="labels", show_default=True,
-    help="Recorded data: take the labels' boxes, or what the detector model makes of them.",
+    "--boxes", type=click.Choice(["labels", "model"]), default=None,
+    help="Detections: the exact boxes of all objects (default for recorded data), or what the detector model "
+    "makes of them (default for simulated drives).",
 )  # fmt: skip
 @click.option(
     "--frames", "span", callback=_span, default=None, metavar="FIRST-LAST",
@@ -182,8 +183,8 @@ def demo(
 @_common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...], alone: bool,
-    boxes: Boxes, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...], images: Images,
-    jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
+    boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...],
+    images: Images, jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
     """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
 
@@ -221,8 +222,8 @@ def run(
         planned += _recorded_jobs(recorded, template, seeds if given else None, alone)
     if len(recorded) < len(dict.fromkeys(targets)):
         parse_fault_arguments(faults)
-        if span is not None or boxes != "labels":
-            raise click.UsageError("--frames and --boxes are for recorded data (kitti:FOLDER)")
+        if span is not None:
+            raise click.UsageError("--frames is for recorded data (kitti:FOLDER)")
     for target in dict.fromkeys(targets):
         if target in recorded:
             continue
@@ -234,7 +235,7 @@ def run(
             for seed in seeds:
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
-                    images=images, size_px=size, calibration=calibration, found_in=found_in,
+                    images=images, size_px=size, boxes=boxes, calibration=calibration, found_in=found_in,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:

@@ -19,7 +19,7 @@ import numpy as np
 from scenarios.describe import describe
 from scenarios.scenario import Scenario
 from scenarios.seeding import stream
-from simbench.case import ORACLE, Case, Job, JobResult
+from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
 from simbench.score.metrics import METRICS
@@ -65,7 +65,7 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
         words += ["--faults", text]
     if job.faults != ("none",):
         words.append("--alone")  # this case only, not the same drive with errors off
-    if job.boxes != "labels":
+    if job.boxes is not None:
         words += ["--boxes", job.boxes]
     if job.frames is not None:
         words += ["--frames", f"{job.frames[0]}-{job.frames[1]}"]
@@ -115,6 +115,7 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
         "fault_specs": result.faults.as_data(),
         "shake": result.shake,
         "receipts": [dataclasses.asdict(receipt) for receipt in result.receipts],
+        "boxes": boxes_of(result.job, not isinstance(result.scenario, Scenario)),
         "command": reproduce(result.job, pipelines),
     }
 

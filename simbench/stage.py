@@ -16,9 +16,10 @@ from scenarios.load import Family, load_scenario
 from scenarios.scenario import Scenario, System
 from simbench.calibration.file import read_calibration, told
 from simbench.capture import Captured, capture
-from simbench.case import Job
+from simbench.case import Job, boxes_of
 from simbench.plugins import reads_images
 from simbench.recording import Recording
+from simbench.sensors.detector import perfect
 from simbench.sensors.pictures import TakePicture, by_gl, by_rays
 from simbench.sensors.render import Renderer
 from simbench.sensors.rig import SensorRig, assemble, resized
@@ -82,7 +83,11 @@ def set_stage(
 
 def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captured:
     """Run the sensors of a staged job."""
-    return capture(staged.system, staged.rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+    rig = staged.rig
+    if boxes_of(job, recorded=False) == "labels":
+        declared = rig.rig.model_copy(update={"detector": perfect(rig.rig.detector)})
+        rig = replace(rig, rig=declared)
+    return capture(staged.system, rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
 
 
 def as_told(job: Job, staged: Stage, recording: Recording) -> Recording:

@@ -8,7 +8,7 @@ from dataclasses import replace
 from scenarios.errors import BadInput, Where, show
 from scenarios.fault_set import OPTION
 from scenarios.recorded import parse_recorded_faults
-from simbench.case import Images, Job
+from simbench.case import Images, Job, boxes_of
 from simbench.formats.calibration import CAMERA
 from simbench.formats.inject import check_faults
 from simbench.formats.kitti import WORDS, listed, open_kitti
@@ -55,7 +55,7 @@ def plan(job: Job, numbers: Sequence[int] | None, *, alone: bool) -> list[Job]:
 def player_of(job: Job) -> Player:
     """The recording of a job, opened. BadInput: it cannot be, or a fault cannot act on it."""
     drive = open_kitti(job.scenario).drive(job.seed, job.frames)
-    return Player(drive, parse_recorded_faults(job.faults), boxes=job.boxes)
+    return Player(drive, parse_recorded_faults(job.faults), boxes=boxes_of(job, recorded=True))
 
 
 def play_job(job: Job) -> Recorded:

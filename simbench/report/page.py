@@ -47,7 +47,8 @@ SHARPER = 2  # pictures are drawn with twice the camera's pixels, for print
 CROP_PX = 800  # width of a crop's picture
 
 NOT_SHOWN = (
-    "Boxes come from a simulated detector (edge errors, misses in bursts, false boxes), not from a network.",
+    "Boxes come from a simulated detector (misses in bursts, false boxes, edge errors where injected), not "
+    "from a network; with --boxes labels they are exact.",
     "Bodies are rigid primitives with one reflectivity a material; glass is opaque; no loose clothes.",
     "No rain, fog, dust, sun glare, mirrors, retroreflectors, multi-path or cross-talk between LiDARs; the "
     "visible ground is flat.",

@@ -38,8 +38,15 @@ def recall(spec: DetectorSpec, height_px: float, visible_fraction: float) -> flo
     half = spec.recall_half_height_px
     by_height = 1.0 / (1.0 + np.exp(-(height_px - half) / (RECALL_SLOPE * half)))
     span = max(1.0 - spec.min_visible_fraction, 1e-9)
-    by_visibility = min(1.0, 0.5 + 0.5 * (visible_fraction - spec.min_visible_fraction) / span + 0.25)
+    rise = 0.5 * (visible_fraction - spec.min_visible_fraction) / span
+    by_visibility = min(1.0, spec.recall_at_least_visible + rise)
     return float(spec.recall_at_best * by_height * by_visibility)
+
+
+def perfect(spec: DetectorSpec) -> DetectorSpec:
+    """The same detector without a miss above its floors and without a false box."""
+    sure = {"recall_at_best": 1.0, "recall_at_least_visible": 1.0, "recall_half_height_px": 1e-9}
+    return spec.model_copy(update={**sure, "false_boxes_per_image": 0.0})
 
 
 def draw_track_ids(objects: tuple[ObjectInfo, ...], seed: int) -> dict[int, int]:

@@ -10,7 +10,8 @@ import pytest
 from fusion.messages import CameraImage, Detections, EgoMotion, LidarScan
 from scenarios.faults import TriggerOffset
 from simbench.capture import Captured, capture
-from simbench.stage import CATEGORIES
+from simbench.case import Job
+from simbench.stage import CATEGORIES, record
 from tests.simbench.support import bytes_of, digest, recorded, staged
 
 
@@ -117,6 +118,26 @@ def test_one_more_sensor_moves_no_other_sensors_numbers() -> None:
         assert digest([m for m in both[0].messages if pick(m)]) == digest(
             [m for m in both[1].messages if pick(m)]
         )
+
+
+def test_with_boxes_by_labels_every_visible_object_has_its_exact_box_and_nothing_else_has_one() -> None:
+    small = staged(duration_s=1.0, columns=64, background=True, size_px=(320, 200))
+    job = Job(scenario="any", system=small.system.ego, seed=0, pipelines=(), boxes="labels")
+    truth = record(job, small).recording.truth
+    count = 0
+    for image in truth.images:
+        exact = {
+            b.object_id: b.visible_px
+            for b in image.boxes
+            if b.visible_px is not None
+            and b.visible_fraction >= 0.2
+            and b.visible_px[3] - b.visible_px[1] >= 12
+        }
+        assert sorted(image.detection_object_id) == sorted(exact)
+        count += len(exact)
+    assert count > 50
+    by_model = record(replace(job, boxes="model"), small).recording.truth
+    assert sum(len(i.detection_object_id) for i in by_model.images) < count
 
 
 def test_an_early_camera_is_taken_before_its_stamp() -> None:

@@ -277,7 +277,6 @@ def refused(done: Result, *parts: str) -> None:
         ),
         (["kitti:{data}/object", "--boxes", "network"], ("--boxes",)),
         (["overtake-approach", "--frames", "0-3"], ("--frames", "recorded")),
-        (["overtake-approach", "--boxes", "model"], ("--boxes", "recorded")),
         (["overtake-approach", "--faults", "lidar.beam_loss=50"], ("unknown fault", "lidar.beam_loss")),
     ],
 )

@@ -11,7 +11,7 @@ from scipy.stats import rankdata
 from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
 from scenarios.scenario import DetectorSpec
-from simbench.sensors.detector import Detected, Detector, draw_track_ids, recall
+from simbench.sensors.detector import Detected, Detector, draw_track_ids, perfect, recall
 from simbench.truth import ObjectInfo, TrueBox
 
 CAMERA = PinholeCamera(fx_px=600, fy_px=600, cx_px=480, cy_px=300, width_px=960, height_px=600)
@@ -78,6 +78,14 @@ def test_below_its_floors_nothing_is_found() -> None:
     assert recall(SURE, SURE.min_height_px - 0.1, 1.0) == 0.0
     assert recall(SURE, 100.0, SURE.min_visible_fraction - 0.01) == 0.0
     assert recall(SURE, 1000.0, 1.0) == pytest.approx(1.0)
+
+
+@given(st.floats(0, 500), st.floats(0, 1))
+def test_a_perfect_detector_misses_nothing_above_its_floors(height_px: float, visible: float) -> None:
+    spec = DetectorSpec(recall_at_best=0.6, false_boxes_per_image=3.0)
+    above = height_px >= spec.min_height_px and visible >= spec.min_visible_fraction
+    assert recall(perfect(spec), height_px, visible) == (1.0 if above else 0.0)
+    assert perfect(spec).false_boxes_per_image == 0.0
 
 
 @given(h=st.floats(0, 500), dh=st.floats(0, 100), v=st.floats(0, 1), dv=st.floats(0, 1))
