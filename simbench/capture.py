@@ -7,11 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fusion.messages import CameraImage, CategorySize, Detections, LidarScan, Measurement
+from fusion.messages import CameraImage, CategorySize, Detections, EgoMotion
 from scenarios.fault_set import FaultSet
 from scenarios.scenario import System
 from scenarios.seeding import stream
+from simbench.faults.deliver import deliver
+from simbench.faults.delivery import Delivery, Shot, Sweep
 from simbench.faults.draw import Drawn, draw
+from simbench.faults.fault import Site, Step
 from simbench.motion import Motion, at
 from simbench.recording import Recording
 from simbench.sensors import gnss, imu, lidar
@@ -22,7 +25,7 @@ from simbench.sensors.pictures import TakePicture
 from simbench.sensors.rig import SensorRig
 from simbench.sensors.row_view import RowView
 from simbench.sensors.rows import exposure_at, row_times_ns
-from simbench.truth import GnssReference, ImageTruth, ScanTruth, TrueBox, Truth
+from simbench.truth import GnssReference, ImageTruth, TrueBox, Truth
 from simbench.world import World
 
 FARTHEST_BOX_M = 90.0
@@ -45,6 +48,7 @@ class Captured:
     """A recording, and what the receipts need beside it.
 
     timing: when each camera would have exposed without faults. script: the motion without shake and flex.
+    measured: what the sensors measured; steps: what the faults of its delivery made of it, one by one.
     """
 
     recording: Recording
@@ -52,6 +56,9 @@ class Captured:
     script: Motion
     timing: Mapping[str, CameraTiming]
     drawn: Drawn
+    measured: Delivery
+    steps: tuple[Step, ...]
+    site: Site
 
 
 def capture(
@@ -71,53 +78,57 @@ def capture(
     timing = {name: rig.timing(name, system.duration_s, seed) for name in rig.cameras}
     drawn = draw(rig, world, faults, timing, system, seed)
     motion = set_in_motion(world, rig, system.ego, drawn)
-    messages: list[Measurement] = []
-    scans: list[ScanTruth] = []
-    images: list[ImageTruth] = []
-    for scan, scan_truth in _scans(rig, motion, system.duration_s, seed, ideal):
-        messages.append(scan)
-        scans.append(scan_truth)
-    for name in rig.cameras:
-        for delivered, image_truth in _shots(
-            name, rig, motion, system.ego, timing[name], drawn, seed, picture
-        ):
-            messages += delivered
-            images.append(image_truth)
-    period_ns = lidar.period_ns(rig.lidar)
-    end_ns = rig.end_ns(system.duration_s, timing)
-    if rig.imu is not None and rig.imu_name is not None:
-        messages += imu.measure(rig.imu_name, rig.imu, motion, end_ns, stream(seed, "imu"), rig.phases(seed))
     target_id = None if system.target is None else world.find(system.target).object_id
+    end_ns = rig.end_ns(system.duration_s, timing)
+    measured = Delivery(
+        sweeps=tuple(_sweeps(rig, motion, system.duration_s, seed, ideal)),
+        shots={
+            name: tuple(_shots(name, rig, motion, system.ego, timing[name], drawn, seed, picture))
+            for name in rig.cameras
+        },
+        motions=_motions(rig, motion, end_ns, seed),
+        reference=_reference(rig, motion, target_id, end_ns, seed),
+    )
+    site = Site(rig=rig, motion=motion, duration_s=system.duration_s, seed=seed)
+    delivered, steps = deliver(measured, faults, site)
     return Captured(
         recording=Recording(
             calibration=drawn.told,
             categories=categories,
-            messages=in_order_of_arrival(messages),
+            messages=delivered.messages,
             truth=Truth(
                 objects=world.objects,
                 target_id=target_id,
-                scans=tuple(scans),
-                images=tuple(images),
+                scans=tuple(sweep.truth for sweep in delivered.sweeps),
+                images=tuple(shot.truth for name in rig.cameras for shot in delivered.shots[name]),
                 calibration=rig.calibration,
                 poses=motion,
-                reference=_reference(rig, motion, target_id, end_ns, seed),
-                period_ns=period_ns,
+                reference=delivered.reference,
+                period_ns=lidar.period_ns(rig.lidar),
             ),
         ),
         motion=motion,
         script=set_in_motion(world, rig, system.ego, None),
         timing=timing,
         drawn=drawn,
+        measured=measured,
+        steps=steps,
+        site=site,
     )
 
 
-def _scans(
-    rig: SensorRig, motion: Motion, duration_s: float, seed: int, ideal: bool
-) -> Iterator[tuple[LidarScan, ScanTruth]]:
+def _sweeps(rig: SensorRig, motion: Motion, duration_s: float, seed: int, ideal: bool) -> Iterator[Sweep]:
     def rng(seq: int) -> np.random.Generator | None:
         return None if ideal else stream(seed, "lidar", rig.lidar_name, str(seq))
 
-    return lidar.sweeps(rig.lidar_name, rig.lidar, motion, rig.sweeps(duration_s), rng)
+    for scan, truth in lidar.sweeps(rig.lidar_name, rig.lidar, motion, rig.sweeps(duration_s), rng):
+        yield Sweep(scan=scan, truth=truth)
+
+
+def _motions(rig: SensorRig, motion: Motion, end_ns: int, seed: int) -> tuple[EgoMotion, ...]:
+    if rig.imu is None or rig.imu_name is None:
+        return ()
+    return imu.measure(rig.imu_name, rig.imu, motion, end_ns, stream(seed, "imu"), rig.phases(seed))
 
 
 def _shots(
@@ -129,8 +140,8 @@ def _shots(
     drawn: Drawn,
     seed: int,
     picture: TakePicture | None,
-) -> Iterator[tuple[list[Measurement], ImageTruth]]:
-    """What one camera delivers for each exposure: detections, and the image where pictures are taken."""
+) -> Iterator[Shot]:
+    """What one camera measures in each exposure."""
     world, pinhole = motion.world, rig.pinholes[name]
     by_rows = timing.line_delay_ns != 0.0 or any(pinhole.distortion)
     taken_ns = timing.mid_ns + drawn.delays_ns.get(name, 0)
@@ -150,17 +161,16 @@ def _shots(
         detected = detector.detect(seq, boxes)
         late_ns = capture_ns - int(timing.mid_ns[seq])
         stamp_ns, arrival_ns = int(timing.stamp_ns[seq]), int(timing.arrival_ns[seq]) + late_ns
-        delivered: list[Measurement] = [
-            Detections(sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, boxes=detected.boxes)
-        ]
+        image = None
         if picture is not None:
             rgb = picture(motion, name, seq, capture_ns)
-            delivered.append(
-                CameraImage(sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, rgb=rgb)
-            )
-        yield (
-            delivered,
-            ImageTruth(
+            image = CameraImage(sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, rgb=rgb)
+        yield Shot(
+            detections=Detections(
+                sensor=name, seq=seq, stamp_ns=stamp_ns, arrival_ns=arrival_ns, boxes=detected.boxes
+            ),
+            image=image,
+            truth=ImageTruth(
                 sensor=name,
                 seq=seq,
                 capture_ns=capture_ns,
@@ -179,16 +189,6 @@ def _reference(
     antenna = rig.T_ego_sensor[rig.gnss_name].translation_m
     phase_ns = rig.phases(seed).gnss_ns
     return gnss.reference(rig.gnss, antenna, motion, target_id, end_ns, stream(seed, "gnss"), phase_ns)
-
-
-def in_order_of_arrival(messages: list[Measurement]) -> tuple[Measurement, ...]:
-    """Sorted by arrival; ties by kind, sensor and count, so that the order never depends on how it was
-    made.
-    """
-    kinds = ("EgoMotion", "CameraImage", "Detections", "LidarScan")
-    return tuple(
-        sorted(messages, key=lambda m: (m.arrival_ns, kinds.index(type(m).__name__), m.sensor, m.seq))
-    )
 
 
 class _Sought:

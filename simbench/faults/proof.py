@@ -6,7 +6,6 @@ import numpy as np
 
 from fusion.camera import project_points
 from fusion.geometry import rotation_log
-from fusion.messages import Detections, EgoMotion
 from scenarios.fault_set import FaultSet
 from scenarios.faults import CalibrationRotation, EdgeError, Flex, RoadShake, TriggerOffset, Vibration
 from simbench.capture import Captured
@@ -16,6 +15,7 @@ from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
 from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
+from simbench.faults.deliver import DELIVERY_FAULTS
 from simbench.faults.draw import struck
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.receipt import Receipt
@@ -28,7 +28,7 @@ def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: f
     """Requested, realised and measured of every fault that is on."""
     if not faults:
         return ()
-    drawn, truth = captured.drawn, captured.recording.truth
+    drawn, measured = captured.drawn, captured.measured
     evidence, body = _evidence(captured, rig), _body(captured, rig)
     result: list[Receipt] = []
     if (offset := faults.get(TriggerOffset)) is not None:
@@ -44,15 +44,19 @@ def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: f
     if (rotation := faults.get(CalibrationRotation)) is not None:
         told = captured.recording.calibration
         result += calibration_fault.receipts(
-            rotation, struck(rotation, rig), truth.calibration, drawn.told, told, evidence, body
+            rotation, struck(rotation, rig), rig.calibration, drawn.told, told, evidence, body
         )
     if (edge_error := faults.get(EdgeError)) is not None:
         sizes = {name: (c.width_px, c.height_px) for name, c in rig.pinholes.items()}
         period_s = {1.0 / camera.rate_hz for camera in rig.cameras.values()}
-        detections = [m for m in captured.recording.messages if isinstance(m, Detections)]
+        shots = [shot for name in rig.cameras for shot in measured.shots[name]]
+        detections, images = [shot.detections for shot in shots], [shot.truth for shot in shots]
         result += detector_fault.receipts(
-            edge_error, drawn.edge_errors, detections, truth.images, sizes, max(period_s, default=1.0)
+            edge_error, drawn.edge_errors, detections, images, sizes, max(period_s, default=1.0)
         )
+    entries = {fault.spec: fault for fault in DELIVERY_FAULTS}
+    for step in captured.steps:
+        result += entries[type(step.spec)].receipts(step.spec, step, captured.site)
     return tuple(result)
 
 
@@ -60,7 +64,7 @@ def _body(captured: Captured, rig: SensorRig) -> BodyAttitude | None:
     """The body's attitude by the gyro; None where the rig has none."""
     if rig.imu is None:
         return None
-    gyro = [m for m in captured.recording.messages if isinstance(m, EgoMotion)]
+    gyro = captured.measured.motions
     R_ego, _ = captured.motion.ego(np.array([m.stamp_ns for m in gyro], dtype=np.int64))
     return gyro_attitude(gyro, np.arctan2(R_ego[:, 1, 0], R_ego[:, 0, 0]), rig.imu.gyro_noise_dps_rthz)
 
@@ -69,10 +73,10 @@ def _evidence(captured: Captured, rig: SensorRig) -> tuple[CameraEvidence, ...]:
     """Per camera, PnP on the known points of every frame, against the pose that the script predicts: the
     place at the nominal mid-exposure, the attitude at the true one.
     """
-    script, images = captured.script, captured.recording.truth.images
+    script = captured.script
     result = []
     for name, camera in rig.pinholes.items():
-        taken = [image for image in images if image.sensor == name]
+        taken = [shot.truth for shot in captured.measured.shots[name]]
         mid_ns = captured.timing[name].mid_ns
         taken_ns = np.array([image.capture_ns for image in taken], dtype=np.int64)
         R_ego, _ = script.ego(mid_ns)

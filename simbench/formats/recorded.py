@@ -27,8 +27,8 @@ from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
 from scenarios.recorded import BeamLoss
 from scenarios.scenario import DetectorSpec
-from simbench.capture import in_order_of_arrival
 from simbench.case import Boxes
+from simbench.faults.delivery import in_order_of_arrival
 from simbench.faults.receipt import Receipt
 from simbench.formats.calibration import CAMERA, LIDAR, OXTS
 from simbench.formats.inject import check_faults, draw_on_recording, moved_box

@@ -1,0 +1,35 @@
+"""Fault specs: what may go wrong, in physical units, each acting at one place of the flow.
+
+A spec says how much; the bench holds the injector and the receipt of each. A spec of zero strength is off,
+and a fault that is off is the same as one that was never mentioned. Random parts (jitter, phases, axes) are
+drawn by the bench from the run's seed. Marks of the sources: data sheet, computed (in a trial), judgement.
+
+One file a family, named as the first word of its faults' names.
+"""
+
+from __future__ import annotations
+
+from scenarios.faults.calibration import CalibrationRotation
+from scenarios.faults.detector import EdgeError
+from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
+from scenarios.faults.spec import Cameras, FaultSpec
+from scenarios.faults.timing import TriggerOffset
+
+__all__ = [
+    "FAULTS",
+    "CalibrationRotation",
+    "Cameras",
+    "EdgeError",
+    "FaultSpec",
+    "Flex",
+    "RoadEvent",
+    "RoadShake",
+    "Roughness",
+    "TriggerOffset",
+    "Vibration",
+]
+
+FAULTS: dict[str, type[FaultSpec]] = {
+    spec.name: spec for spec in (CalibrationRotation, EdgeError, Flex, RoadShake, Vibration, TriggerOffset)
+}
+"""Every fault by its name, sorted."""

@@ -1,0 +1,50 @@
+"""What every fault spec has: a name, a strength, a unit; and the sensors that it may name."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, get_args, get_origin
+
+from pydantic import model_validator
+
+from scenarios.scenario import Name, Spec, broken
+
+Cameras = Literal["cameras"] | tuple[Name, ...]
+"""All cameras of the rig, or some by their names."""
+
+
+class FaultSpec(Spec):
+    """Base of all faults. `name` is how a file calls it, `strength` the field that a bare number sets.
+
+    A spec is off when every field in `zero_when_off` is 0.
+    """
+
+    name: ClassVar[str]
+    strength: ClassVar[str]
+    zero_when_off: ClassVar[tuple[str, ...]]
+    unit: ClassVar[str]
+
+    @classmethod
+    def strength_words(cls) -> tuple[str, ...]:
+        """The words that the strength may be, weakest first; none where it is a number."""
+        annotation = cls.model_fields[cls.strength].annotation
+        return tuple(get_args(annotation)) if get_origin(annotation) is Literal else ()
+
+    @property
+    def is_off(self) -> bool:
+        """Whether this spec does nothing."""
+        return all(getattr(self, field) == 0.0 for field in self.zero_when_off)
+
+    @property
+    def named_cameras(self) -> tuple[str, ...]:
+        """The cameras that this spec names one by one; empty when it means all of them."""
+        sensors = getattr(self, "sensors", "cameras")
+        return () if sensors == "cameras" else tuple(sensors)
+
+    @model_validator(mode="after")
+    def _names_cameras_once(self) -> FaultSpec:
+        named = self.named_cameras
+        if getattr(self, "sensors", "cameras") == ():
+            raise broken("names no camera; leave it out to mean all", "sensors")
+        if len(set(named)) < len(named):
+            raise broken("names a camera twice", "sensors")
+        return self
