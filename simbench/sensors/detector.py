@@ -46,7 +46,7 @@ def recall(spec: DetectorSpec, height_px: float, visible_fraction: float) -> flo
 def perfect(spec: DetectorSpec) -> DetectorSpec:
     """The same detector without a miss above its floors and without a false box."""
     sure = {"recall_at_best": 1.0, "recall_at_least_visible": 1.0, "recall_half_height_px": 1e-9}
-    return spec.model_copy(update={**sure, "false_boxes_per_image": 0.0})
+    return spec.model_copy(update={**sure, "miss_burst_frames": 1.0, "false_boxes_per_image": 0.0})
 
 
 def draw_track_ids(objects: tuple[ObjectInfo, ...], seed: int) -> dict[int, int]:

@@ -88,6 +88,13 @@ def test_a_perfect_detector_misses_nothing_above_its_floors(height_px: float, vi
     assert perfect(spec).false_boxes_per_image == 0.0
 
 
+def test_a_perfect_detector_sees_what_enters_the_picture_at_once() -> None:
+    detector = Detector(perfect(DetectorSpec()), "cam", CAMERA, objects(30), 2, 0, {})
+    too_low = tuple(box(i, (0.0, 300.0, 9.0, 308.0)) for i in range(30))
+    assert detector.detect(0, too_low).object_id == ()
+    assert len(detector.detect(1, tuple(box(i) for i in range(30))).object_id) == 30
+
+
 @given(h=st.floats(0, 500), dh=st.floats(0, 100), v=st.floats(0, 1), dv=st.floats(0, 1))
 def test_recall_never_falls_with_height_or_visibility(h: float, dh: float, v: float, dv: float) -> None:
     spec = DetectorSpec()
