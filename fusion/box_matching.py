@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float64, Int64
 
 from fusion.camera import PinholeCamera
-from fusion.candidates import BoxFit, CandidateConfig, fit_boxes, placed, view_clusters
+from fusion.candidates import BoxFit, CandidateConfig, cut, fit_boxes, placed, view_clusters
 from fusion.messages import BoxPx, CategorySize, Detection
 from fusion.object_track import ObjectTrack, TrackConfig
 from fusion.scene import Scene
@@ -33,13 +33,15 @@ class MatchingConfig:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MatchedBox:
-    """A detection with what it may be, and the spread (right, down) of where that lies."""
+    """A detection with what it may be, the spread (right, down) of where that lies, and whether the image's
+    border cuts it."""
 
     camera: str
     detection: Detection
     size: CategorySize
     fit: BoxFit
     sd_rad: tuple[float, float]
+    cut: bool
 
 
 def match_boxes(
@@ -105,6 +107,7 @@ def match_boxes(
                 config.sd_rad + config.sd_share * (box_px[2] - box_px[0]) / camera.fx_px,
                 config.sd_rad + config.sd_share * (box_px[3] - box_px[1]) / camera.fy_px,
             ),
+            cut=bool(cut(np.array(box_px).reshape(1, 4, 1), camera, config.candidates)[0, 0]),
         )
         for place, (detection, box_px) in enumerate(usable)
     ]
@@ -141,7 +144,8 @@ def ranked_candidates(
     worst = config.least_score - 4.0
     total: dict[int, float] = {}
     for box in boxes:
-        score = placed(box.fit, shifts[box.camera], box.sd_rad, config.place_cap)
+        cap = config.candidates.weak_cap if box.cut else config.place_cap
+        score = placed(box.fit, shifts[box.camera], box.sd_rad, cap)
         for number, value in zip(box.fit.cluster.tolist(), score.tolist(), strict=True):
             total[number] = total.get(number, 0.0) + max(value - worst, 0.0)
     ranked = sorted(total.items(), key=lambda item: (-item[1], item[0]))[: config.keep]

@@ -6,6 +6,10 @@ stands would look so and so high, so the box's height tells the range; the clust
 should be the box's; it should not be taller than the category, nor larger from above, nor have far fewer
 points than beams go through the box. Every term is capped:
 one bad term (an occluded half, a missing wheel) does not outweigh all others.
+
+A box that the left or right border of the image cuts shows a part of its object, maybe a wheel only: what it
+says of place and height counts less. Its object may stand beside the image as the LiDAR saw it, the farther
+the nearer it is: `adrift_m` is how far something may have gone between the sweep and the image.
 """
 
 from __future__ import annotations
@@ -13,7 +17,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Bool, Float64, Int64
 
 from fusion.camera import PinholeCamera
 from fusion.footprint import Clusters
@@ -35,6 +39,8 @@ class CandidateConfig:
     count_sd: float = 1.0  # of the number of points against half of the beams that the box spans, logarithm
     cap: float = 4.5
     weak_cap: float = 2.0  # of width and height: both fail where only a part is seen
+    adrift_m: float = 0.5
+    border_px: float = 1.0  # a box this near to the border is cut by it
     beam_rad: float = 0.006  # what a cluster's outline lacks in the image, a beam's spacing
 
 
@@ -49,8 +55,8 @@ class BoxFit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class View:
-    """Clusters as one camera sees them: their numbers [m], outlines in the image [m 4] (cut at its border),
-    and their feet on the ground, in the camera frame [m 3] and the image [m 2]. `up`: the vertical there.
+    """Clusters as one camera sees them: their numbers [m], outlines [m 4] in the image or a bit beside it,
+    their feet on the ground, in the camera frame [m 3] and the image [m 2]. `up`: the vertical there.
     """
 
     cluster: Int64[np.ndarray, " m"]
@@ -94,13 +100,15 @@ def view_clusters(
         )
     points = np.concatenate([clusters.points(int(c)) for c in chosen])
     start = np.concatenate([[0], np.cumsum(clusters.count[chosen])[:-1]])
-    uv_px = camera.project(T_camera_points.apply(xyz_m[points]))
+    xyz_camera_m = T_camera_points.apply(xyz_m[points])
+    uv_px = camera.project(xyz_camera_m)
     uv_px = np.ascontiguousarray(uv_px.T)
-    inside = (uv_px[0] >= 0.0) & (uv_px[0] <= camera.width_px)
+    # What lies just beside the image may belong to a box at its border.
+    beside_px = camera.fx_px * (config.reach_rad + config.adrift_m / np.maximum(xyz_camera_m[:, 2], 0.5))
+    inside = (uv_px[0] >= -beside_px) & (uv_px[0] <= camera.width_px + beside_px)  # False for NaN
     inside &= (uv_px[1] >= 0.0) & (uv_px[1] <= camera.height_px)
     low = np.minimum.reduceat(np.where(inside, uv_px, np.inf), start, axis=1)
     high = np.maximum.reduceat(np.where(inside, uv_px, -np.inf), start, axis=1)
-    # What lies just beside the image may belong to a box at its border when the calibration is off.
     seen = np.add.reduceat(inside.astype(np.int64), start) > 0
     return View(
         cluster=chosen[seen],
@@ -130,6 +138,7 @@ def fit_boxes(
     length_m, width_m, height_m = np.array([size.mean_m for size in sizes]).T[:, :, None]
     boxes = np.array(boxes_px, dtype=np.float64).reshape(-1, 4, 1)
     x0, y0, x1, y1 = boxes[:, 0], boxes[:, 1], boxes[:, 2], boxes[:, 3]
+    is_cut = cut(boxes, camera, config)
     top_m = view.foot_m + height_m[:, :, None] * view.up
     top_px = camera.project(top_m.reshape(-1, 3)).reshape((*top_m.shape[:2], 2))
     # How far the motion moves the foot in the image, without the lens's distortion: [b m].
@@ -137,8 +146,8 @@ def fit_boxes(
     ahead_m = np.maximum(depth_m + moved_m[:, 2:], 0.5)
     right_px = camera.fx_px * ((view.foot_m[:, 0] + moved_m[:, :1]) / ahead_m - view.foot_m[:, 0] / depth_m)
     down_px = camera.fy_px * ((view.foot_m[:, 1] + moved_m[:, 1:2]) / ahead_m - view.foot_m[:, 1] / depth_m)
-    left = np.maximum(view.outline_px[:, 0] + right_px, 0.0)
-    right = np.minimum(view.outline_px[:, 2] + right_px, camera.width_px)
+    left = np.clip(view.outline_px[:, 0] + right_px, 0.0, camera.width_px)
+    right = np.clip(view.outline_px[:, 2] + right_px, 0.0, camera.width_px)
     upper = np.clip(top_px[:, :, 1] + down_px, 0.0, camera.height_px)
     lower = np.clip(view.foot_px[:, 1] + down_px, 0.0, camera.height_px)
     beside = (0.5 * (x0 + x1) - 0.5 * (left + right)) / camera.fx_px
@@ -155,13 +164,15 @@ def fit_boxes(
     likeness = -own - _cost(np.log(seen_px / (x1 - x0)) / config.width_sd, config.weak_cap)
     if config.range_prior:
         expected_px = np.maximum(lower - upper, 1.0)
-        likeness -= _cost(np.log((y1 - y0) / expected_px) / config.height_sd, config.cap)
+        cap = np.where(is_cut, config.weak_cap, config.cap)
+        likeness -= _cost(np.log((y1 - y0) / expected_px) / config.height_sd, cap)
     if config.count_prior and beams_per_sr is not None:
         beams = beams_per_sr * (x1 - x0) * (y1 - y0) / (camera.fx_px * camera.fy_px)
         share = clusters.count[view.cluster] / np.maximum(0.5 * beams, 1.0)
         likeness -= _cost(np.minimum(np.log(share), 0.0) / config.count_sd, config.cap)
     reach = config.reach_rad + 0.5 * (x1 - x0) / camera.fx_px
-    near = (np.abs(beside) < reach) & (np.abs(below) < reach)  # False for NaN
+    upright = np.where(is_cut, config.reach_rad + (y1 - y0) / camera.fy_px, reach)
+    near = (np.abs(beside) < reach) & (np.abs(below) < upright)  # False for NaN
     fits = []
     for box in range(len(boxes)):
         picked = np.flatnonzero(near[box])
@@ -170,6 +181,16 @@ def fit_boxes(
             BoxFit(cluster=view.cluster[picked], offset_rad=offset_rad, likeness=likeness[box, picked])
         )
     return fits
+
+
+def cut(
+    boxes_px: Float64[np.ndarray, "b 4 1"], camera: PinholeCamera, config: CandidateConfig
+) -> Bool[np.ndarray, "b 1"]:
+    """Which boxes the left or right border of the image cuts."""
+    at_border: np.ndarray = (boxes_px[:, 0] <= config.border_px) | (
+        boxes_px[:, 2] >= camera.width_px - config.border_px
+    )
+    return at_border
 
 
 def placed(
@@ -184,6 +205,8 @@ def placed(
     return score
 
 
-def _cost(sds: Float64[np.ndarray, "*b m"], cap: float) -> Float64[np.ndarray, "*b m"]:
+def _cost(
+    sds: Float64[np.ndarray, "*b m"], cap: float | Float64[np.ndarray, "*b 1"]
+) -> Float64[np.ndarray, "*b m"]:
     cost: np.ndarray = np.minimum(0.5 * sds**2, cap)
     return cost

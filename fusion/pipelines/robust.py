@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -149,18 +149,26 @@ class Robust(ScanPipeline):
         with clock("shift"):
             shifts = self._shifts(boxes)
         with clock("associate"):
-            chosen = self._associate(scene, boxes, shifts)
+            by_track = _by_track(boxes)
+            chosen = self._associate(scene, by_track, shifts)
         with clock("localize"):
-            objects = {}
+            objects: dict[int, LocalizedObject] = {}
             for track_id, choice in chosen.items():
                 track = self._objects[track_id]
                 velocity = track.velocity_mps(self.config.track)
                 sighting = sight(scene, track, choice.points, velocity, choice.support, self.config.track)
                 track.take(sighting, self.config.track)
                 track.detected_ns = sighting.stamp_ns
-                for place, found in self._objects_of(track, sighting, choice, scan, frame):
-                    objects[place] = found
-            self._follow(scene, set(chosen))
+                objects |= self._objects_of(track, sighting, choice, scan, frame)
+            for track_id, sighting in self._follow(scene, set(chosen)).items():
+                if track_id in by_track:  # nothing fits its boxes, but it stands where it should be
+                    choice = _Choice(
+                        points=sighting.points,
+                        support=0.0,
+                        score=self.config.matching.least_score,
+                        boxes=by_track[track_id],
+                    )
+                    objects |= self._objects_of(self._objects[track_id], sighting, choice, scan, frame)
             self._scenes.append(scene)
         return tuple(found for _, found in sorted(objects.items(), key=lambda item: item[0]))
 
@@ -199,15 +207,13 @@ class Robust(ScanPipeline):
         return shifts
 
     def _associate(
-        self, scene: Scene, boxes: list[MatchedBox], shifts: Mapping[str, Float64[np.ndarray, "2"]]
+        self,
+        scene: Scene,
+        by_track: Mapping[int, list[tuple[int, MatchedBox]]],
+        shifts: Mapping[str, Float64[np.ndarray, "2"]],
     ) -> dict[int, _Choice]:
         """For every track the cluster that is its object."""
         config = self.config
-        by_track: dict[int, list[tuple[int, MatchedBox]]] = {}
-        for place, box in enumerate(boxes):
-            members = by_track.setdefault(box.detection.track_id, [])
-            if not members or members[0][1].size == box.size:  # the first box's category is the track's
-                members.append((place, box))
         ranked = {}
         for track_id, members in by_track.items():
             numbers, score = ranked_candidates([box for _, box in members], shifts, config.matching)
@@ -263,9 +269,11 @@ class Robust(ScanPipeline):
             order = np.argsort(-lower, kind="stable")
             ranked[track_id] = numbers[order], lower[order]
 
-    def _follow(self, scene: Scene, seen: set[int]) -> None:
-        """Look for tracks without a box where they should be, and for new ones in the scans before."""
+    def _follow(self, scene: Scene, seen: set[int]) -> dict[int, Sighting]:
+        """Look for tracks that no box showed where they should be, and for new ones in the scans before.
+        The sightings of this scan, by track."""
         config = self.config.track
+        followed = {}
         for track_id, track in self._objects.items():
             if track.belief is None or len(track.sightings) < config.heading_sightings:
                 continue
@@ -280,6 +288,8 @@ class Robust(ScanPipeline):
             found = look_where_expected(scene, track, ahead.position_m, ahead.velocity_mps, last, config)
             if found is not None and found.stamp_ns > last.stamp_ns:
                 track.take(found, config)
+                followed[track_id] = found
+        return followed
 
     def _look_back(self, track: ObjectTrack) -> None:
         """Sightings before the first box, as long as the track is where it should have been."""
@@ -300,8 +310,8 @@ class Robust(ScanPipeline):
 
     def _objects_of(
         self, track: ObjectTrack, sighting: Sighting, choice: _Choice, scan: LidarScan, frame: WorkingFrame
-    ) -> list[tuple[int, LocalizedObject]]:
-        """The output of a sighting: one object for every camera that shows it, with its box's place."""
+    ) -> dict[int, LocalizedObject]:
+        """The output of a sighting: one object for every camera that shows it, by its box's place."""
         xy_m = sighting.centre_odom_m
         if self.config.track.filter and track.belief is not None and not track.surprises:
             xy_m = track.belief.position_m
@@ -314,20 +324,27 @@ class Robust(ScanPipeline):
             choice.score, choice.support, len(sighting.points), len(track.sightings), self.config.confidence
         )
         by_camera = {box.camera: (place, box) for place, box in reversed(choice.boxes)}
-        return [
-            (
-                place,
-                LocalizedObject(
-                    track_id=track.track_id,
-                    category=box.detection.category,
-                    sensor=box.camera,
-                    stamp_ns=sighting.stamp_ns,
-                    points=sighting.points,
-                    position_ego_m=position_ego_m,
-                    distance_m=math.hypot(from_lidar[0], from_lidar[1]),
-                    azimuth_rad=math.atan2(from_lidar[1], from_lidar[0]),
-                    confidence=chance,
-                ),
+        return {
+            place: LocalizedObject(
+                track_id=track.track_id,
+                category=box.detection.category,
+                sensor=box.camera,
+                stamp_ns=sighting.stamp_ns,
+                points=sighting.points,
+                position_ego_m=position_ego_m,
+                distance_m=math.hypot(from_lidar[0], from_lidar[1]),
+                azimuth_rad=math.atan2(from_lidar[1], from_lidar[0]),
+                confidence=chance,
             )
             for place, box in by_camera.values()
-        ]
+        }
+
+
+def _by_track(boxes: Sequence[MatchedBox]) -> dict[int, list[tuple[int, MatchedBox]]]:
+    """The boxes of every track, each with its place among all; the first one's category is the track's."""
+    found: dict[int, list[tuple[int, MatchedBox]]] = {}
+    for place, box in enumerate(boxes):
+        members = found.setdefault(box.detection.track_id, [])
+        if not members or members[0][1].size == box.size:
+            members.append((place, box))
+    return found

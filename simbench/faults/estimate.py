@@ -19,6 +19,8 @@ from fusion.geometry import skew
 from fusion.messages import EgoMotion
 
 SLOWEST_MPS = 0.5
+ROUNDS = 6  # of integrating the gyro: a swing of 1 rad leaves 1/720
+LEAST_TURN_RAD = 1e-3  # of the heading: less turns no tilt into anything
 
 
 class SlowEgo(Exception):  # noqa: N818 (a reason for a receipt, not a failure)
@@ -53,11 +55,13 @@ class CameraEvidence:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BodyAttitude:
     """The body's attitude by the gyro: small angles about the ego's axes, [n 3] in rad, less what the script
-    turns and less its straight-line fit. `sd_rad`: what the gyro's own noise adds (1 SD).
+    turns and less its straight-line fit. `yaw_rad` [n]: the heading that the script turns to. `sd_rad`: what
+    the gyro's own noise adds (1 SD).
     """
 
     stamp_ns: Int64[np.ndarray, " n"]
     angle_rad: Float64[np.ndarray, "n 3"]
+    yaw_rad: Float64[np.ndarray, " n"]
     sd_rad: float
 
     @property
@@ -68,6 +72,21 @@ class BodyAttitude:
     def at(self, t_ns: Int64[np.ndarray, " f"]) -> Float64[np.ndarray, "f 3"]:
         """Interpolated linearly."""
         return np.stack([np.interp(t_ns, self.stamp_ns, self.angle_rad[:, a]) for a in range(3)], axis=1)
+
+    def seen(
+        self, value: Float64[np.ndarray, "f a"], t_ns: Int64[np.ndarray, " f"]
+    ) -> Float64[np.ndarray, "f a"]:
+        """What of angles at t_ns a gyro can see. It knows neither their mean nor their trend c0 + c1 t; and
+        where the heading psi turns, a body that is tilted by these turns them into roll and pitch, by
+        c0 psi + c1 int t dpsi. All four are fitted and taken off; measured and drawn angles alike.
+        """
+        t = np.linspace(-1.0, 1.0, len(t_ns))
+        psi = np.interp(t_ns, self.stamp_ns, self.yaw_rad)
+        turned = np.concatenate([[0.0], np.cumsum(0.5 * (t[1:] + t[:-1]) * np.diff(psi))])
+        unseen = np.stack([np.ones_like(t), t, psi - psi.mean(), turned - turned.mean()], axis=1)
+        unseen = unseen[:, [True, True, *(np.ptp(unseen[:, 2:], axis=0) > LEAST_TURN_RAD)]]
+        rest: np.ndarray = value - unseen @ np.linalg.lstsq(unseen, value, rcond=None)[0]
+        return rest
 
 
 def camera_pose(
@@ -112,7 +131,8 @@ def gyro_attitude(
     """Integrate the gyro. scripted_yaw_rad: heading of the script at the messages' stamps.
 
     A body that rolls and pitches reads a part of its pitch rate as yaw and so on; to first order of the
-    angles (p + r pitch, q - r roll, r + q roll) this is undone.
+    angles (p + r pitch, q - r roll, r + q roll) this is undone. The angles are those sought: from round to
+    round they err by the next power of the heading's swing over its factorial.
     """
     stamp = np.array([m.stamp_ns for m in messages], dtype=np.int64)
     rate = np.stack([m.rate_radps for m in messages])
@@ -125,13 +145,14 @@ def gyro_attitude(
         angle[:, 2] -= yaw
         return detrended(angle)
 
-    roll, pitch, _ = integrated(rate).T
-    _, q, r = rate.T
-    angle = integrated(rate + np.stack([r * pitch, -r * roll, q * roll], axis=1))
+    angle, (_, q, r) = integrated(rate), rate.T
+    for _ in range(ROUNDS):
+        roll, pitch, _ = angle.T
+        angle = integrated(rate + np.stack([r * pitch, -r * roll, q * roll], axis=1))
     # White noise of the rate integrates to a random walk, about its straight line 0.26 of the end's SD on
     # average.
     walk = np.deg2rad(noise_dps_rthz) * np.sqrt(0.5 * (stamp[-1] - stamp[0]) * 1e-9)
-    return BodyAttitude(stamp_ns=stamp, angle_rad=angle, sd_rad=float(0.26 * walk))
+    return BodyAttitude(stamp_ns=stamp, angle_rad=angle, yaw_rad=yaw, sd_rad=float(0.26 * walk))
 
 
 def lever_shift_m(item: CameraEvidence) -> Float64[np.ndarray, "f 3"]:

@@ -169,8 +169,9 @@ def found_rms(
     found: list[tuple[float | None, float]] = [(None, 0.0)] * 4
     if body is not None:
         inside = body.stamp_ns < duration_s * 1e9
-        signal = detrended(_at(realised, body.stamp_ns[inside])[:, :3])
-        angle = detrended(body.angle_rad[inside])
+        seen_ns = body.stamp_ns[inside]
+        signal = body.seen(_at(realised, seen_ns)[:, :3], seen_ns)
+        angle = body.seen(body.angle_rad[inside], seen_ns)
         for axis in range(3):
             # Gyro noise, its sampling, and what is left of turns about three axes not commuting: no gyro sees
             # the mean of the shake over the run, which is the larger the shorter the run.
@@ -196,6 +197,12 @@ def _contained(found: np.ndarray, drawn: np.ndarray, rms: float, scale: float) -
     if rms == 0.0 or not np.any(drawn):
         return scale * float(np.std(found))
     return rms * gain(found, drawn)
+
+
+def _seen(
+    turn_rad: Float64[np.ndarray, "f 3"], item: CameraEvidence, body: BodyAttitude | None
+) -> Float64[np.ndarray, "f 3"]:
+    return detrended(turn_rad) if body is None else body.seen(turn_rad, item.taken_ns)
 
 
 def _heave_sd_m(evidence: Sequence[CameraEvidence], body: BodyAttitude | None) -> float:
@@ -225,7 +232,7 @@ def flex_receipts(
     result: list[Receipt] = []
     others: list[tuple[float, float]] = []
     for item in evidence:
-        bending = detrended(item.turn_rad if body is None else bracket_turn_rad(item, body))
+        bending = _seen(item.turn_rad if body is None else bracket_turn_rad(item, body), item, body)
         # What the gyro leaves of the body's shake: it is sampled, and turns about several axes do not
         # commute.
         left = 0.02 * float(bending.std()) if body is None else body.rms_rad * (0.005 + 0.5 * body.rms_rad)
@@ -235,7 +242,7 @@ def flex_receipts(
             continue
         shake = realised.get(item.camera)
         rms = 0.0 if shake is None else float(np.rad2deg(np.sqrt(np.mean(shake.rms(duration_s) ** 2))))
-        drawn = np.zeros_like(bending) if shake is None else detrended(shake.at(item.taken_ns))
+        drawn = np.zeros_like(bending) if shake is None else _seen(shake.at(item.taken_ns), item, body)
         result.append(
             judge(
                 fault=FLEX,

@@ -134,10 +134,10 @@ def _roughness(spec: RoadShake, realised: Ride, duration_s: float, body: BodyAtt
         inside = (body.stamp_ns >= 0) & (body.stamp_ns < duration_s * 1e9)
         row = (body.stamp_ns[inside] - realised.start_ns) / realised.step_ns
         pitch = np.interp(row, np.arange(len(realised.linear)), realised.linear[:, 1])
-        expected = detrended(pitch[:, None])
+        expected = body.seen(pitch[:, None], body.stamp_ns[inside])
         size = float(np.std(expected))
         if size > 0.0:
-            times = gain(detrended(body.angle_rad[inside][:, 1:2]), expected)
+            times = gain(body.seen(body.angle_rad[inside][:, 1:2], body.stamp_ns[inside]), expected)
             measured = drawn * times * abs(times)
             sd = drawn * 2.0 * (LINEAR_SHARE / 5.0 + body.sd_rad / size)
     return judge(

@@ -92,6 +92,14 @@ def test_a_short_run_is_no_mismatch(system: str, duration_s: float) -> None:
         assert MISMATCH not in statuses(proof(at, seed))
 
 
+@pytest.mark.parametrize("seed", [8, 18, 19])
+def test_a_body_that_shakes_while_its_path_sways_is_no_mismatch(seed: int) -> None:
+    """A heading that swings by 20 degrees turns roll into pitch and back, and so does a gyro's own error."""
+    specs = (Vibration(rms_deg=2.0), Flex(rms_deg=0.3, sensors=("cam-left",)))
+    at = staged("wearable", seed, specs=specs, scenario="overtake-wobble")
+    assert statuses(proof(at, seed)) == {OK}
+
+
 # -- mutants ----------------------------------------------------------------------------------------------
 
 SCALES = {"off": 0.0, "half": 0.5, "twice": 2.0, "sign": -1.0}
