@@ -72,9 +72,9 @@ def map_into_boxes(
     if not boxes_px:
         return ()
     near = _crop(xyz_m, T_camera_lidar, _bearing_bounds(boxes_px, camera))
-    uv_px = camera.project(T_camera_lidar.apply(xyz_m[:, near].T))
-    inside = (inside_box(uv_px, box) for box in boxes_px)
-    return tuple(MappedPoints(points=near[mask], uv_px=uv_px[mask]) for mask in inside)
+    uv_px = camera.project(T_camera_lidar.apply(xyz_m.take(near, axis=1).T))
+    inside = (inside_box(uv_px, box).nonzero()[0] for box in boxes_px)
+    return tuple(MappedPoints(points=near[rows], uv_px=uv_px[rows]) for rows in inside)
 
 
 def _bearing_bounds(boxes_px: Sequence[BoxPx], camera: PinholeCamera) -> tuple[float, float, float, float]:

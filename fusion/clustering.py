@@ -13,7 +13,10 @@ paper's) is dragged by scattered background and then the bin misses half of the 
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Bool, Float, Float64, Int64
@@ -51,7 +54,7 @@ class DistanceHistogram:
 
     def candidates(self) -> tuple[Int64[np.ndarray, " _"], ...]:
         """Indices of the points of each candidate cluster, nearest cluster first."""
-        return tuple(np.flatnonzero(self.bin_of_point == b) for b in np.flatnonzero(self.is_candidate))
+        return tuple((self.bin_of_point == b).nonzero()[0] for b in self.is_candidate.nonzero()[0])
 
 
 def distance_histogram(
@@ -61,12 +64,12 @@ def distance_histogram(
 
     With fewer than `min_points` points within any one granularity there is no candidate.
     """
-    distance_m = np.asarray(distance_m, dtype=np.float64)
-    if not np.isfinite(distance_m).all():
-        raise ValueError("distance_m holds a number that is not finite")
     if not granularity_m > 0.0:
         raise ValueError(f"granularity_m must be positive, got {granularity_m}")
-    ascending = np.sort(distance_m)
+    distance_m = np.asarray(distance_m, dtype=np.float64)
+    ascending = np.sort(distance_m)  # NaN comes last
+    if len(ascending) > 0 and not (math.isfinite(ascending[0]) and math.isfinite(ascending[-1])):
+        raise ValueError("distance_m holds a number that is not finite")
     centres = density_centres(
         ascending,
         granularity_m=granularity_m,
@@ -83,19 +86,30 @@ def distance_histogram(
             is_candidate=none,
             bin_of_point=np.full(len(distance_m), -1, dtype=np.int64),
         )
-    edges_m, is_centre = _fill_bins(centres, granularity_m, float(ascending[0]), float(ascending[-1]))
-    bin_of_point = np.clip(np.searchsorted(edges_m, distance_m, side="right") - 1, 0, len(is_centre) - 1)
+    edges, is_centre = _fill_bins(centres, granularity_m, float(ascending[0]), float(ascending[-1]))
+    edges_m = np.array(edges)
+    bin_of_point = edges_m.searchsorted(distance_m, side="right")
+    bin_of_point -= 1
+    np.maximum(bin_of_point, 0, out=bin_of_point)
+    np.minimum(bin_of_point, len(is_centre) - 1, out=bin_of_point)
     counts = np.bincount(bin_of_point, minlength=len(is_centre))
-    padded = np.concatenate([[0], counts, [0]])
-    is_peak = is_centre | ((counts >= padded[:-2]) & (counts >= padded[2:]))
-    enough = (counts >= min_points) & (counts >= config.peak_ratio * counts.max())
     return DistanceHistogram(
         edges_m=edges_m,
         counts=counts,
-        is_centre=is_centre,
-        is_candidate=is_peak & enough,
+        is_centre=np.array(is_centre),
+        is_candidate=np.array(_candidates(counts.tolist(), is_centre, min_points, config.peak_ratio)),
         bin_of_point=bin_of_point,
     )
+
+
+def _candidates(counts: list[int], is_centre: list[bool], min_points: int, peak_ratio: float) -> list[bool]:
+    """Which bins are a peak with enough points."""
+    enough = max(float(min_points), peak_ratio * max(counts))
+    before, after = [0, *counts[:-1]], [*counts[1:], 0]
+    return [
+        count >= enough and (centre or (count >= left and count >= right))
+        for count, centre, left, right in zip(counts, is_centre, before, after, strict=True)
+    ]
 
 
 def density_centres(
@@ -105,90 +119,110 @@ def density_centres(
     min_points: int,
     max_centres: int,
     trimmed: bool,
-) -> Float64[np.ndarray, " c"]:
-    """Centres of one-dimensional K-means over sorted values, ascending, at least one granularity apart."""
-    centres = _densest_windows(ascending_m, granularity_m, min_points, max_centres)
-    if len(centres) == 0:
-        return centres
-    sums = np.concatenate([[0.0], np.cumsum(ascending_m)])
+) -> list[float]:
+    """Centres of one-dimensional K-means over sorted values, ascending, at least one granularity apart.
+
+    Plain numbers, because an AOI has a handful of centres: arrays of them would cost ten times as much.
+    """
+    if len(ascending_m) < max(min_points, 1):
+        return []
+    values, sums = ascending_m.tolist(), _running_sums(ascending_m)
+    centres = _densest_windows(ascending_m, values, sums, granularity_m, min_points, max_centres)
+    if not centres:
+        return []
+    reach_m = 0.5 * granularity_m if trimmed else math.inf
     for _ in range(_ITERATIONS):
-        low, high = _shares(ascending_m, centres, 0.5 * granularity_m if trimmed else np.inf)
-        filled = high > low
-        moved = np.where(filled, (sums[high] - sums[low]) / np.maximum(high - low, 1), centres)
-        done = bool(np.abs(moved - centres).max() < 1e-9)
-        centres = np.sort(moved)
+        moved = [
+            (sums[high] - sums[low]) / (high - low) if high > low else centre
+            for centre, (low, high) in zip(centres, _shares(values, centres, reach_m), strict=True)
+        ]
+        done = max(abs(new - old) for new, old in zip(moved, centres, strict=True)) < 1e-9
+        centres = sorted(moved)
         if done:
             break
-    low, high = _shares(ascending_m, centres, 0.5 * granularity_m)
+    shares = _shares(values, centres, 0.5 * granularity_m)
+    fullest_first = sorted(range(len(centres)), key=lambda index: shares[index][0] - shares[index][1])
     kept: list[float] = []
-    for index in np.argsort(low - high, kind="stable"):  # the fullest first; bins must not overlap
+    for index in fullest_first:  # bins must not overlap
         if all(abs(centres[index] - other) >= granularity_m for other in kept):
-            kept.append(float(centres[index]))
-    return np.sort(np.array(kept))
+            kept.append(centres[index])
+    return sorted(kept)
 
 
-def _shares(
-    ascending_m: np.ndarray, centres: np.ndarray, reach_m: float
-) -> tuple[Int64[np.ndarray, " c"], Int64[np.ndarray, " c"]]:
+def _shares(ascending_m: list[float], centres: list[float], reach_m: float) -> list[tuple[int, int]]:
     """Per centre the range [low, high) of the sorted values nearest to it and within its reach."""
-    middle = 0.5 * (centres[1:] + centres[:-1])
-    start, stop = centres - reach_m, centres + reach_m
-    np.maximum(start[1:], middle, out=start[1:])
-    np.minimum(stop[:-1], middle, out=stop[:-1])
-    return ascending_m.searchsorted(start, "left"), ascending_m.searchsorted(stop, "right")
+    middles = [0.5 * (right + left) for left, right in pairwise(centres)]
+    return [
+        (
+            bisect_left(ascending_m, max(centre - reach_m, left)),
+            bisect_right(ascending_m, min(centre + reach_m, right)),
+        )
+        for centre, left, right in zip(centres, [-math.inf, *middles], [*middles, math.inf], strict=True)
+    ]
+
+
+def _running_sums(values: Float64[np.ndarray, " k"]) -> list[float]:
+    """[0, v0, v0 + v1, ...]: the sum of a range is the difference of two of them."""
+    return [0.0, *values.cumsum().tolist()]
 
 
 def _densest_windows(
-    ascending_m: Float64[np.ndarray, " k"], width_m: float, min_points: int, most: int
-) -> Float64[np.ndarray, " c"]:
+    ascending_m: Float64[np.ndarray, " k"],
+    values: list[float],
+    sums: list[float],
+    width_m: float,
+    min_points: int,
+    most: int,
+) -> list[float]:
     """Means of the densest windows (ties: nearest), each sought among the points outside those before it.
 
     A window is moved to the mean of its points before these are taken away, so that it does not take the
-    edge of the next object with it. Returned ascending.
+    edge of the next object with it. Returned ascending. `values`, `sums`: `ascending_m` and its running sums.
     """
-    left, centres = ascending_m, np.zeros(0)
+    left, centres = ascending_m, list[float]()
     while len(centres) < most and len(left) >= max(min_points, 1):
-        ends = left.searchsorted(left + width_m, side="right")
-        start = int((ends - np.arange(len(left))).argmax())
-        end = int(ends[start])
+        within = left.searchsorted(left + width_m, side="right")
+        within -= np.arange(len(left))
+        start = int(within.argmax())
+        end = start + int(within[start])
         if end - start < min_points:
             break
-        sums = np.zeros(len(left) + 1)
-        left.cumsum(out=sums[1:])
-        centre = float(sums[end] - sums[start]) / (end - start)
+        if left is not ascending_m:
+            values, sums = left.tolist(), _running_sums(left)
+        centre = (sums[end] - sums[start]) / (end - start)
         for _ in range(_ITERATIONS):
-            start, end = left.searchsorted((centre - 0.5 * width_m, centre + 0.5 * width_m)).tolist()
-            moved = float(sums[end] - sums[start]) / (end - start) if end > start else centre
+            start = bisect_left(values, centre - 0.5 * width_m)
+            end = bisect_left(values, centre + 0.5 * width_m)
+            moved = (sums[end] - sums[start]) / (end - start) if end > start else centre
             if abs(moved - centre) < 1e-9:
                 break
             centre = moved
-        centres = np.append(centres, centre)
+        centres.append(centre)
         left = np.concatenate([left[:start], left[max(end, start + 1) :]])
-    return np.sort(centres)
+    return sorted(centres)
 
 
 def _fill_bins(
-    centres: Float64[np.ndarray, " c"], width_m: float, nearest_m: float, farthest_m: float
-) -> tuple[Float64[np.ndarray, " b1"], Bool[np.ndarray, " b"]]:
+    centres: list[float], width_m: float, nearest_m: float, farthest_m: float
+) -> tuple[list[float], list[bool]]:
     """Edges [b + 1] of bins over all values, and which bins [b] belong to a centre.
 
     From each centre's bin outward bins of the full width follow; the last one before the next is narrower.
     """
     half = 0.5 * width_m
-    before = int(np.ceil(max(centres[0] - half - nearest_m, 0.0) / width_m))
-    edges = [float(centres[0] - half) - width_m * i for i in range(before, 0, -1)]
+    before = math.ceil(max(centres[0] - half - nearest_m, 0.0) / width_m)
+    edges = [centres[0] - half - width_m * i for i in range(before, 0, -1)]
     is_centre = [False] * before
     for index, centre in enumerate(centres):
-        edges.append(float(centre - half))
+        edges.append(centre - half)
         is_centre.append(True)
-        start = float(centre + half)
+        start = centre + half
         if index + 1 < len(centres):
-            stop = float(centres[index + 1] - half)
-            gap = stop - start
-            fill = int(np.ceil(gap / width_m - 1e-9)) if gap > 1e-9 else 0
+            gap = centres[index + 1] - half - start
+            fill = math.ceil(gap / width_m - 1e-9) if gap > 1e-9 else 0
         else:
-            fill = int(np.floor(max(farthest_m - start, 0.0) / width_m)) + 1 if farthest_m >= start else 0
+            fill = math.floor((farthest_m - start) / width_m) + 1 if farthest_m >= start else 0
         edges += [start + width_m * i for i in range(fill)]
         is_centre += [False] * fill
-    edges.append(float(centres[-1] + half) + width_m * fill)
-    return np.array(edges), np.array(is_centre)
+    edges.append(centres[-1] + half + width_m * fill)
+    return edges, is_centre

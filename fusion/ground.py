@@ -85,7 +85,7 @@ def remove_ground(
         in_region &= np.abs(xyz[1]) <= 0.5 * config.width_m
         in_region &= np.isfinite(xyz[2])
     near = np.flatnonzero(in_region)
-    xyz = xyz[:, near]
+    xyz = xyz.take(near, axis=1)
     rng = np.random.Generator(np.random.PCG64(config.seed))
     plane, share, trials = _find_plane(xyz, config, rng)
     if plane is None:

@@ -35,10 +35,18 @@ def planar_distance_m(xyz_m: Float32[np.ndarray, "k 3"]) -> Float64[np.ndarray, 
 def median_point(xyz_m: Float32[np.ndarray, "k 3"]) -> int:
     """Index of the point at the middle rank of planar distance (of two middle ranks the nearer).
 
-    Equal distances are ordered by x, then y, so that the order of the points decides nothing.
+    The points [k 3], k >= 1, are finite. Equal distances are ordered by x, then y, then z, so that the order
+    of the points decides nothing.
     """
-    order = np.lexsort((xyz_m[:, 2], xyz_m[:, 1], xyz_m[:, 0], planar_distance_m(xyz_m)))
-    return int(order[(len(order) - 1) // 2])
+    distance_m = planar_distance_m(xyz_m)
+    rank = (len(distance_m) - 1) // 2
+    middle_m = np.partition(distance_m, rank)[rank]
+    equal = (distance_m == middle_m).nonzero()[0]
+    if len(equal) == 1:
+        return int(equal[0])
+    x, y, z = xyz_m[equal].T
+    nearer = int(np.count_nonzero(distance_m < middle_m))
+    return int(equal[np.lexsort((z, y, x))[rank - nearer]])
 
 
 def localize(

@@ -113,10 +113,14 @@ class Calibration:
     def __post_init__(self) -> None:
         object.__setattr__(self, "T_ego_sensor", MappingProxyType(dict(self.T_ego_sensor)))
         object.__setattr__(self, "cameras", MappingProxyType(dict(self.cameras)))
+        object.__setattr__(self, "_T_camera_lidar", {})
 
     def T_camera_lidar(self, camera: str, lidar: str) -> Transform:
-        """LiDAR coordinates to the camera's optical coordinates."""
-        return self.T_ego_sensor[camera].inverse() @ self.T_ego_sensor[lidar]
+        """LiDAR coordinates to the camera's optical coordinates; worked out once for every pair."""
+        known: dict[tuple[str, str], Transform] = self.__dict__["_T_camera_lidar"]
+        if (camera, lidar) not in known:
+            known[camera, lidar] = self.T_ego_sensor[camera].inverse() @ self.T_ego_sensor[lidar]
+        return known[camera, lidar]
 
 
 @dataclass(frozen=True, kw_only=True)

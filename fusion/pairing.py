@@ -67,12 +67,12 @@ class Pairing:
 
     def _nearest(self, scan: LidarScan) -> tuple[Detections, ...]:
         """At most one message per camera, in the order of the cameras' names."""
-        half_ns = self.period_ns(scan.sensor) / 2
+        half_ns, stamp_ns = self.period_ns(scan.sensor) / 2, scan.stamp_ns
         nearest = (
-            min(recent, key=lambda d: (abs(d.stamp_ns - scan.stamp_ns), d.stamp_ns))
+            min(recent, key=lambda d: (abs(d.stamp_ns - stamp_ns), d.stamp_ns))
             for _, recent in sorted(self._detections.items())
         )
-        return tuple(d for d in nearest if abs(d.stamp_ns - scan.stamp_ns) <= half_ns)
+        return tuple(d for d in nearest if abs(d.stamp_ns - stamp_ns) <= half_ns)
 
     def period_ns(self, lidar: str) -> float:
         """Median time between this LiDAR's distinct stamps; the default until there are three such times.

@@ -32,6 +32,8 @@ from fusion.geometry import readonly
 MainAxis = Literal["vertical", "horizontal"]
 SHAPES_SCHEMA = "fusion-shapes/1"
 
+_CELL_NUMBER = np.array([1, 3])  # of (column, row), row by row
+
 _HORIZONTAL = frozenset({"car", "truck", "bus", "van"})
 
 
@@ -56,7 +58,7 @@ def tilt_rad(uv_px: Float[np.ndarray, "k 2"], axis: MainAxis) -> float:
     """
     if len(uv_px) < 2:
         return 0.0
-    u, v = (uv_px - uv_px.mean(axis=0)).T
+    u, v = (uv_px - np.add.reduce(uv_px, axis=0) / len(uv_px)).T
     uu, vv, uv = float(u @ u), float(v @ v), float(u @ v)
     if math.hypot(uu - vv, 2.0 * uv) <= 1e-12 * (uu + vv):
         return 0.0
@@ -85,12 +87,18 @@ def descriptor(uv_px: Float[np.ndarray, "k 2"]) -> Float64[np.ndarray, "9"]:
     """
     if len(uv_px) == 0:
         raise ValueError("a shape needs at least one point")
-    low = uv_px.min(axis=0)
-    side = uv_px.max(axis=0) - low
-    long = side > 1e-9 * side.max()  # shorter than that is rounding
-    share = np.where(long, (uv_px - low) / np.where(long, side, 1.0), 0.5)
-    column, row = np.minimum((3.0 * share).astype(np.int64), 2).T
-    return np.bincount(3 * row + column, minlength=9) / len(uv_px)
+    low = np.minimum.reduce(uv_px, axis=0)
+    side = np.maximum.reduce(uv_px, axis=0) - low
+    width, height = side.tolist()
+    rounding = 1e-9 * max(width, height)  # a side no longer than that has no length
+    if width > rounding and height > rounding:
+        share = (uv_px - low) / side
+    else:
+        long = side > rounding
+        share = np.where(long, (uv_px - low) / np.where(long, side, 1.0), 0.5)
+    cells = (3.0 * share).astype(np.int64)
+    np.minimum(cells, 2, out=cells)
+    return np.bincount(cells @ _CELL_NUMBER, minlength=9) / len(uv_px)
 
 
 def kl_divergence(
@@ -98,7 +106,7 @@ def kl_divergence(
 ) -> float:
     """D(P || Q) in nats of two distributions over the same cells, both smoothed."""
     p, q = p + smoothing, q + smoothing
-    p, q = p / p.sum(), q / q.sum()
+    p, q = p / np.add.reduce(p), q / np.add.reduce(q)
     return max(float(p @ np.log(p / q)), 0.0)
 
 

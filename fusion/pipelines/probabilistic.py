@@ -138,7 +138,8 @@ def explain_scan(
         kept = np.flatnonzero(
             remove_ground(scan.xyz_m, calibration.T_ego_sensor[scan.sensor], config.ground).keep
         )
-        xyz_m = np.ascontiguousarray(scan.xyz_m[kept].T)
+        xyz_m = scan.xyz_m.T.take(kept, axis=1)
+        distance_m = planar_distance_m(xyz_m.T)
     explained = []
     for detections in paired:
         camera = calibration.cameras[detections.sensor]
@@ -156,7 +157,7 @@ def explain_scan(
                     aoi_px=aoi_px,
                     points=points,
                     uv_px=inside.uv_px,
-                    distance_m=planar_distance_m(scan.xyz_m[points]),
+                    distance_m=distance_m[inside.points],
                     granularity_m=category.granularity_m,
                     min_points=category.min_points,
                     benchmark=shapes.of(detection.category),

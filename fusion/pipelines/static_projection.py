@@ -48,7 +48,7 @@ class StaticProjection(ScanPipeline):
                 kept = np.arange(len(scan.xyz_m))
             else:
                 kept = np.flatnonzero(remove_ground(scan.xyz_m, T_ego_lidar, self.config.ground).keep)
-            xyz_m = np.ascontiguousarray(scan.xyz_m[kept].T)
+            xyz_m = scan.xyz_m.T.take(kept, axis=1)
         objects = []
         for detections in paired:
             camera = calibration.cameras[detections.sensor]

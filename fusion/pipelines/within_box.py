@@ -62,7 +62,7 @@ class WithinBox(ScanPipeline):
         T_ego_lidar = calibration.T_ego_sensor[scan.sensor]
         with clock("ground"):
             kept = without_ground(scan.xyz_m, T_ego_lidar, self._shared.ground)
-            xyz_m = np.ascontiguousarray(scan.xyz_m[kept].T)
+            xyz_m = scan.xyz_m.T.take(kept, axis=1)
         objects = []
         for detections in paired:
             camera = calibration.cameras[detections.sensor]
