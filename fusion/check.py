@@ -87,7 +87,7 @@ def _run(
     calibration: Calibration,
     categories: Mapping[str, CategorySize],
     messages: Sequence[Measurement],
-) -> tuple[list[object], tuple[Trajectory, ...]] | str:
+) -> tuple[list[object], tuple[object, ...]] | str:
     """The answer to each message and the trajectories, or what was raised."""
     step = "the factory"
     try:
@@ -107,7 +107,7 @@ def _run(
 def _validate(
     messages: Sequence[Measurement],
     outputs: Sequence[object],
-    trajectories: Sequence[Trajectory],
+    trajectories: Sequence[object],
 ) -> list[str]:
     """Breaches of the contract in one run."""
     failures = []
@@ -131,12 +131,20 @@ def _validate(
         if key in answered:
             failures.append(f"a second output for scan {key}")
         answered.add(key)
-        for found in output.objects:
+        things: tuple[object, ...] = output.objects
+        for found in things:
+            if not isinstance(found, LocalizedObject):
+                failures.append(f"scan {key}: an object is a {type(found).__name__}, not a LocalizedObject")
+                continue
             failures += [f"scan {key}: {failure}" for failure in _object(found, delivered[key], tracks)]
-    for track in trajectories:
+    tracked = [track for track in trajectories if isinstance(track, Trajectory)]
+    for other in trajectories:
+        if not isinstance(other, Trajectory):
+            failures.append(f"trajectories returned a {type(other).__name__}, not a Trajectory")
+    for track in tracked:
         failures += [f"trajectory {track.track_id}: {failure}" for failure in _trajectory(track)]
     known = {track_id for _, track_id in tracks}
-    ids = [track.track_id for track in trajectories]
+    ids = [track.track_id for track in tracked]
     if len(set(ids)) < len(ids):
         failures.append("two trajectories of one track id")
     failures += [f"a trajectory of track {i}, which was never detected" for i in ids if i not in known]

@@ -6,7 +6,8 @@ A plane n.x + d = 0 is fitted to 6 random points N times, where (the paper's equ
     N = ln(1 - p) / ln(1 - (1 - e)^n),    p = 0.99, e = 0.2, n = 6  ->  N = 16,
 
 its normal n within 15 degrees of up; points within 0.2 m of it, on either side, are ground. The paper accepts
-a plane only with (1 - e) = 80 % of the points on it. In most frames the ground has less than that, so the
+a plane only with P = (1 - e) S points on it, S being "the total number of 3D LiDAR points": we read 80 % of
+those in the region, since the others are gone by then. In most frames the ground has less than that, so the
 rule taken literally (`literal_acceptance`) removes nothing there. By default 80 % only ends the search early:
 e is measured from the best plane so far and N follows from the same equation (Hartley and Zisserman, Multiple
 View Geometry, algorithm 4.5), and the best plane is used after a least-squares fit to its own inliers.

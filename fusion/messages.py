@@ -105,12 +105,19 @@ Measurement: TypeAlias = LidarScan | CameraImage | Detections | EgoMotion
 
 @dataclass(frozen=True, kw_only=True)
 class Calibration:
-    """What the fusion is told: `T_ego_sensor[name]` at rest for every sensor, `cameras[name]` intrinsics."""
+    """What the fusion is told: `T_ego_sensor[name]` at rest for every sensor, `cameras[name]` intrinsics.
+
+    ValueError: a camera without a `T_ego_sensor`.
+    """
 
     T_ego_sensor: Mapping[str, Transform]
     cameras: Mapping[str, PinholeCamera]
 
     def __post_init__(self) -> None:
+        for name in self.cameras:
+            if name not in self.T_ego_sensor:
+                known = ", ".join(sorted(self.T_ego_sensor)) or "none"
+                raise ValueError(f"camera {name!r} has intrinsics but no T_ego_sensor; known: {known}")
         object.__setattr__(self, "T_ego_sensor", MappingProxyType(dict(self.T_ego_sensor)))
         object.__setattr__(self, "cameras", MappingProxyType(dict(self.cameras)))
         object.__setattr__(self, "_T_camera_lidar", {})

@@ -128,6 +128,7 @@ for entry in sorted(found, key=lambda e: e.name): print(entry.name, entry.load()
         "frustum_dbscan FrustumDbscan",
         "nearest_gap NearestGap",
         "probabilistic Probabilistic",
+        "probabilistic_paper ProbabilisticPaper",
         "robust Robust",
         "roi_cluster RoiCluster",
         "shrunken_median ShrunkenMedian",

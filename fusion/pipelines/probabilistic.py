@@ -7,9 +7,14 @@
 5 `localize.py`    distance and angle of its median point
 6 `smooth.py`      the track over the run, outliers removed
 
-`ProbabilisticConfig()` is the method with our readings where the text leaves a gap or fails as printed;
-`ProbabilisticConfig.paper()` follows the print. Where a value comes from stands beside it, in the config
-of its step ("paper", or "ours" where the paper names none).
+What they are for (eqs. 1 to 5): the mapping M puts a LiDAR point on a pixel, with errors (e_l, e_w). Of the
+points p_k of object k, G(M^-1(c_k)) shall miss fewer than t1 with probability t2 or more, c_k being its box.
+The paper gives t1 and t2 no value and never measures them; what it reports is the share of selected points
+at the object's distance.
+
+`ProbabilisticConfig()` is the method with our readings where the text leaves a gap or fails as printed
+(pipeline `probabilistic`); `ProbabilisticConfig.paper()` follows the print (`probabilistic_paper`). Where a
+value comes from stands beside it, in the config of its step ("paper", or "ours" where the paper names none).
 """
 
 from __future__ import annotations
@@ -122,6 +127,13 @@ class Probabilistic(ScanPipeline):
             )
 
 
+class ProbabilisticPaper(Probabilistic):
+    """All six steps with `ProbabilisticConfig.paper()`; by name: `probabilistic_paper`."""
+
+    def __init__(self) -> None:
+        super().__init__(ProbabilisticConfig.paper())
+
+
 def explain_scan(
     scan: LidarScan,
     paired: tuple[Detections, ...],
@@ -167,11 +179,6 @@ def explain_scan(
                 )
             )
     return tuple(explained)
-
-
-def probabilistic_paper() -> Probabilistic:
-    """The pipeline as the paper prints it."""
-    return Probabilistic(ProbabilisticConfig.paper())
 
 
 def _confidence(aoi: AoiExplanation, chosen: int) -> float:

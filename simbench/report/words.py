@@ -16,12 +16,14 @@ _LONG = {
     "static_projection": "raw box",
     "static_projection_ground": "raw box, ground removed",
     "probabilistic": "six steps",
+    "probabilistic_paper": "six steps as printed",
     ORACLE: "oracle",
 }
 _SHORT = {
     "static_projection": "raw box",
     "static_projection_ground": "no ground",
     "probabilistic": "six steps",
+    "probabilistic_paper": "as printed",
 }
 MOST_CLAUSES = 2
 

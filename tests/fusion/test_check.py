@@ -18,15 +18,13 @@ from fusion.messages import (
     Trajectory,
 )
 from fusion.pipeline import Pipeline
-from fusion.pipelines.probabilistic import Probabilistic, probabilistic_paper
-from fusion.pipelines.static_projection import StaticProjection, StaticProjectionGround
-
-OURS = [StaticProjection, StaticProjectionGround, Probabilistic, probabilistic_paper]
+from fusion.pipelines.static_projection import StaticProjection
+from tests.fusion.ours import OURS
 
 
-@pytest.mark.parametrize("factory", OURS, ids=lambda f: f.__name__)
-def test_our_pipelines_keep_the_contract(factory: Callable[[], Pipeline]) -> None:
-    assert check_pipeline(factory) == ()
+@pytest.mark.parametrize("name", OURS)
+def test_our_pipelines_keep_the_contract(name: str) -> None:
+    assert check_pipeline(OURS[name]) == ()
 
 
 class Wrapped:
@@ -119,6 +117,21 @@ class Invents(Wrapped):
         return edited(output, track_id=4711)
 
 
+class NoObject(Wrapped):
+    def change(self, output: FusionOutput, measurement: Measurement) -> FusionOutput:
+        object.__setattr__(output, "objects", ({"track_id": 1},))
+        return output
+
+
+class NoTrajectory(Wrapped):
+    def trajectories(self) -> tuple[Trajectory, ...]:
+        return ("left", "right")  # type: ignore[return-value]
+
+
+class HasNoReset:
+    update = trajectories = staticmethod(lambda *_: None)
+
+
 class GoesBack(Wrapped):
     def trajectories(self) -> tuple[Trajectory, ...]:
         return tuple(replace(t, stamp_ns=t.stamp_ns[::-1].copy()) for t in super().trajectories())
@@ -137,6 +150,9 @@ class GoesBack(Wrapped):
         (Repeats, "a second output"),
         (Foresees, "not delivered yet"),
         (Invents, "never detected"),
+        (NoObject, "an object is a dict, not a LocalizedObject"),
+        (NoTrajectory, "trajectories returned a str, not a Trajectory"),
+        (HasNoReset, "reset raised AttributeError: 'HasNoReset' object has no attribute 'reset'"),
         (GoesBack, "ascend"),
     ],
 )
