@@ -2,67 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 from math import sqrt
 from types import MappingProxyType
-from typing import Literal
 
 from scenarios.errors import BadInput
-from scenarios.faults import FAULTS, FaultSpec
+from scenarios.faults import FAMILIES, FAULTS, FaultSpec
+from scenarios.faults.spec import Profile, Severity
 
-Profile = Literal["car", "rider"]
+__all__ = ["ROAD_PITCH_RMS_DEG", "SEVERITIES", "Profile", "Severity", "road_class", "severe"]
 
-
-@dataclass(frozen=True, kw_only=True)
-class Severity:
-    """What severities 1 to 5 of a fault mean, as numbers or words. `profile`: the body it holds for (None:
-    both).
-    """
-
-    fault: str
-    values: tuple[float, float, float, float, float] | tuple[str, str, str, str, str]
-    profile: Profile | None
-    source: str
-
-
-SEVERITIES = (
-    Severity(
-        fault="timing.trigger_offset_ms",
-        values=(2.0, 10.0, 30.0, 50.0, 100.0),
-        profile=None,
-        source="field reports of 2 to 150 ms",
-    ),
-    Severity(
-        fault="calibration.rotation_deg",
-        values=(0.1, 0.25, 0.5, 1.0, 2.0),
-        profile=None,
-        source="field reports of 0.1 to 3 degrees",
-    ),
-    Severity(
-        fault="motion.flex_deg",
-        values=(0.02, 0.05, 0.1, 0.2, 0.5),
-        profile=None,
-        source="judgement",
-    ),
-    Severity(
-        fault="motion.road",
-        values=("A", "B", "C", "D", "E"),
-        profile=None,
-        source="classes of ISO 8608",
-    ),
-    Severity(
-        fault="motion.vibration_deg",
-        values=(0.07, 0.14, 0.28, 0.55, 1.1),
-        profile="car",
-        source="pitch of a car at 12.5 m/s on ISO 8608 classes A to E, computed",
-    ),
-    Severity(
-        fault="motion.vibration_deg",
-        values=(0.5, 1.0, 2.0, 3.0, 5.0),
-        profile="rider",
-        source="sway of the wearer, assumed",
-    ),
-)
+SEVERITIES: tuple[Severity, ...] = tuple(s for family in FAMILIES for s in family.SEVERITIES)
+"""Of all faults."""
 
 ROAD_PITCH_RMS_DEG = MappingProxyType(
     {
@@ -80,8 +31,8 @@ def severe(fault: str, level: int, profile: Profile = "car") -> FaultSpec:
         if severity.fault == fault and severity.profile in (None, profile):
             if not 1 <= level <= len(severity.values):
                 raise BadInput(f"severity {level} of {fault} does not exist", allowed="1 to 5")
-            spec = FAULTS[fault]
-            return spec.model_validate({spec.strength: severity.values[level - 1]})
+            spec, value = FAULTS[fault], severity.values[level - 1]
+            return spec.model_validate(dict(value) if isinstance(value, Mapping) else {spec.strength: value})
     raise BadInput(f"{fault} has no severities", allowed=", ".join(sorted({s.fault for s in SEVERITIES})))
 
 

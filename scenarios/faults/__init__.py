@@ -9,6 +9,7 @@ One file a family, named as the first word of its faults' names.
 
 from __future__ import annotations
 
+from scenarios.faults import calibration, camera, detector, lidar, motion, reference, timing
 from scenarios.faults.calibration import CalibrationRotation
 from scenarios.faults.detector import EdgeError
 from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
@@ -16,6 +17,7 @@ from scenarios.faults.spec import Cameras, FaultSpec
 from scenarios.faults.timing import TriggerOffset
 
 __all__ = [
+    "FAMILIES",
     "FAULTS",
     "CalibrationRotation",
     "Cameras",
@@ -29,7 +31,10 @@ __all__ = [
     "Vibration",
 ]
 
+FAMILIES = (calibration, camera, detector, lidar, motion, reference, timing)
+"""One module a family: its SPECS and their SEVERITIES."""
+
 FAULTS: dict[str, type[FaultSpec]] = {
-    spec.name: spec for spec in (CalibrationRotation, EdgeError, Flex, RoadShake, Vibration, TriggerOffset)
+    spec.name: spec for spec in sorted((s for f in FAMILIES for s in f.SPECS), key=lambda spec: spec.name)
 }
 """Every fault by its name, sorted."""

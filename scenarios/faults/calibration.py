@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from scenarios.faults.spec import Cameras, FaultSpec
+from scenarios.faults.spec import Cameras, FaultSpec, Severity
 
 
 class CalibrationRotation(FaultSpec):
@@ -25,3 +25,13 @@ class CalibrationRotation(FaultSpec):
     angle_deg: Annotated[float, Field(ge=-180, le=180, allow_inf_nan=False)] = 0.0
     axis: Literal["random", "roll", "pitch", "yaw"] = "random"
     sensors: Cameras = "cameras"
+
+
+SPECS: tuple[type[FaultSpec], ...] = (CalibrationRotation,)
+SEVERITIES: tuple[Severity, ...] = (
+    Severity(
+        fault=CalibrationRotation.name,
+        values=(0.1, 0.25, 0.5, 1.0, 2.0),
+        source="field reports of 0.1 to 3 degrees",
+    ),
+)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from scenarios.faults.spec import FaultSpec
+from scenarios.faults.spec import FaultSpec, Severity
 
 
 class EdgeError(FaultSpec):
@@ -26,3 +26,7 @@ class EdgeError(FaultSpec):
     sd_fraction: Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)] = 0.03
     tau_s: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] = 0.3
     bias_fraction: Annotated[float, Field(ge=-0.5, le=1, allow_inf_nan=False)] = 0.0
+
+
+SPECS: tuple[type[FaultSpec], ...] = (EdgeError,)
+SEVERITIES: tuple[Severity, ...] = ()

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
-from scenarios.faults.spec import Cameras, FaultSpec
+from scenarios.faults.spec import Cameras, FaultSpec, Severity
 from scenarios.scenario import Finite, Spec
 
 
@@ -89,3 +89,22 @@ class Flex(FaultSpec):
     rms_deg: Annotated[float, Field(ge=0, le=30, allow_inf_nan=False)] = 0.0
     stiffness: Literal["stiff", "soft"] = "stiff"
     sensors: Cameras = "cameras"
+
+
+SPECS: tuple[type[FaultSpec], ...] = (Flex, RoadShake, Vibration)
+SEVERITIES: tuple[Severity, ...] = (
+    Severity(fault=Flex.name, values=(0.02, 0.05, 0.1, 0.2, 0.5), source="judgement"),
+    Severity(fault=RoadShake.name, values=("A", "B", "C", "D", "E"), source="classes of ISO 8608"),
+    Severity(
+        fault=Vibration.name,
+        values=(0.07, 0.14, 0.28, 0.55, 1.1),
+        profile="car",
+        source="pitch of a car at 12.5 m/s on ISO 8608 classes A to E, computed",
+    ),
+    Severity(
+        fault=Vibration.name,
+        values=(0.5, 1.0, 2.0, 3.0, 5.0),
+        profile="rider",
+        source="sway of the wearer, assumed",
+    ),
+)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args, get_origin
 
 from pydantic import model_validator
@@ -10,6 +12,25 @@ from scenarios.scenario import Name, Spec, broken
 
 Cameras = Literal["cameras"] | tuple[Name, ...]
 """All cameras of the rig, or some by their names."""
+
+
+Level = float | str | Mapping[str, float | str]
+"""A fault's strength, or values of several of its fields."""
+
+Profile = Literal["car", "rider"]
+"""Whose body carries the sensors."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Severity:
+    """What severities 1 to 5 of a fault mean: values of its strength, or of several fields at once.
+    `profile`: the body it holds for (None: both).
+    """
+
+    fault: str
+    values: tuple[Level, Level, Level, Level, Level]
+    profile: Profile | None = None
+    source: str
 
 
 class FaultSpec(Spec):

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar
 
 from pydantic import Field
 
-from scenarios.faults.spec import Cameras, FaultSpec
+from scenarios.faults.spec import Cameras, FaultSpec, Severity
 
 
 class TriggerOffset(FaultSpec):
@@ -27,3 +27,13 @@ class TriggerOffset(FaultSpec):
     offset_ms: Annotated[float, Field(ge=-1000, le=1000, allow_inf_nan=False)] = 0.0
     jitter_ms: Annotated[float, Field(ge=0, le=1000, allow_inf_nan=False)] = 0.0
     sensors: Cameras = "cameras"
+
+
+SPECS: tuple[type[FaultSpec], ...] = (TriggerOffset,)
+SEVERITIES: tuple[Severity, ...] = (
+    Severity(
+        fault=TriggerOffset.name,
+        values=(2.0, 10.0, 30.0, 50.0, 100.0),
+        source="field reports of 2 to 150 ms",
+    ),
+)

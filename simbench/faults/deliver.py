@@ -7,10 +7,18 @@ what drivers and networks do to stamps and arrivals, and apart from all of them 
 from __future__ import annotations
 
 from scenarios.fault_set import FaultSet
+from simbench.faults import boxes, pixels, points, position, stamps, transport
 from simbench.faults.delivery import Delivery, counted
 from simbench.faults.fault import DeliveryFault, Site, Step
 
-DELIVERY_FAULTS: tuple[DeliveryFault, ...] = ()
+DELIVERY_FAULTS: tuple[DeliveryFault, ...] = (
+    *boxes.DELIVERED,
+    *points.DELIVERED,
+    *pixels.DELIVERED,
+    *stamps.DELIVERED,
+    *transport.DELIVERED,
+    *position.DELIVERED,
+)
 """In the order in which they act."""
 
 

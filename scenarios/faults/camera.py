@@ -1,0 +1,8 @@
+"""What the pictures lose."""
+
+from __future__ import annotations
+
+from scenarios.faults.spec import FaultSpec, Severity
+
+SPECS: tuple[type[FaultSpec], ...] = ()
+SEVERITIES: tuple[Severity, ...] = ()
