@@ -87,7 +87,7 @@ def view_clusters(
     half_m = 0.5 * np.hypot(*(clusters.high_m - clusters.low_m).T)
     depth = np.maximum(centre[:, 2], 0.5)
     bearing = centre[:, 0] / depth
-    room = half_m / depth + config.reach_rad
+    room = (half_m + config.adrift_m) / depth + config.reach_rad
     near = np.zeros(len(bearing), dtype=bool)
     for x0, _, x1, _ in boxes_px:
         left, right = (x0 - camera.cx_px) / camera.fx_px, (x1 - camera.cx_px) / camera.fx_px
