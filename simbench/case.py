@@ -18,6 +18,7 @@ from simbench.score.score import Scores
 ORACLE = "oracle"
 Images = Literal["none", "raycast", "gl"]
 Boxes = Literal["labels", "model"]
+Told = Literal["true", "found"]
 Status = Literal["ok", "pipeline_error", "timeout", "bench_error", "receipt_mismatch"]
 
 
@@ -40,6 +41,11 @@ class Job:
     frames: tuple[int, int] | None = None
     calibration: str = "true"  # as `--calibration` gives it
     found_in: str | None = None  # the file of the found calibration that the pipelines are told
+
+    @property
+    def told(self) -> Told:
+        """Which calibration the pipelines are told; the recording's own one counts as true."""
+        return "true" if self.found_in is None else "found"
 
 
 def boxes_of(job: Job, recorded: bool) -> Boxes:

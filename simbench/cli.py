@@ -356,7 +356,8 @@ def _print_summary(found: tuple[JobResult, ...]) -> None:
     groups: dict[str, list[Any]] = {}
     for result in found:
         for case in result.cases:
-            words = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
+            told = ("calibration-found",) if result.job.told == "found" else ()
+            words = (result.scenario.name, result.job.system, result.faults.label, *told, case.pipeline)
             groups.setdefault(" ".join(words), []).append(case)
     width = max((len(name) for name in groups), default=0) + 2
     click.echo(" " * width + "".join(f"{name:>16s}" for name in shown))

@@ -19,7 +19,7 @@ import numpy as np
 from scenarios.describe import describe
 from scenarios.scenario import Scenario
 from scenarios.seeding import stream
-from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
+from simbench.case import ORACLE, Case, Job, JobResult, Told, boxes_of
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
 from simbench.score.metrics import METRICS
@@ -95,6 +95,7 @@ def _key(result: JobResult, case: Case) -> dict[str, Any]:
         "pipeline": case.pipeline,
         "seed": result.job.seed,
         "faults": result.faults.label,
+        "calibration": result.job.told,
     }
 
 
@@ -121,13 +122,14 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
 
 
 def _summary(results: Sequence[JobResult]) -> list[dict[str, Any]]:
-    groups: dict[tuple[str, str, str, str], list[tuple[int, Case]]] = {}
+    groups: dict[tuple[str, str, str, Told, str], list[tuple[int, Case]]] = {}
     for result in results:
         for case in result.cases:
-            key = (result.scenario.name, result.job.system, result.faults.label, case.pipeline)
-            groups.setdefault(key, []).append((result.job.seed, case))
+            job, faults = result.job, result.faults.label
+            key = (result.scenario.name, job.system, faults, job.told, case.pipeline)
+            groups.setdefault(key, []).append((job.seed, case))
     content = []
-    for (scenario, system, faults, pipeline), members in groups.items():
+    for (scenario, system, faults, told, pipeline), members in groups.items():
         for metric in METRICS:
             values = {
                 seed: next((r.value for r in case.rows if r.metric == metric.name), None)
@@ -140,6 +142,7 @@ def _summary(results: Sequence[JobResult]) -> list[dict[str, Any]]:
                     "scenario": scenario,
                     "system": system,
                     "faults": faults,
+                    "calibration": told,
                     "pipeline": pipeline,
                     "metric": metric.name,
                     "unit": metric.unit,

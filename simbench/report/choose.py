@@ -1,9 +1,10 @@
 """What a report shows of many results: groups of runs, and the one instant that stands for a group.
 
-A group is a scenario, a system and a set of faults; its runs are seeds. A run has up to two sides, the
-recording without injected errors and the one with them. The instant is a pair (scan, camera) of one run: the
-one whose loss (baseline's TPR without errors less with errors) is the median over all pairs that both sides
-have; of equal losses the one in the middle by pixel shift. So no picture is picked by hand.
+A group is a scenario, a system, a set of faults and the calibration that is told; its runs are seeds. A run
+has up to two sides, the recording without injected errors and the one with them. The instant is a pair (scan,
+camera) of one run: the one whose loss (baseline's TPR without errors less with errors) is the median over all
+pairs that both sides have; of equal losses the one in the middle by pixel shift. So no picture is picked by
+hand.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from simbench.case import ORACLE, Case, JobResult
+from simbench.case import ORACLE, Case, JobResult, Told
 from simbench.exhibit import PairView
 from simbench.score.mapping import PairScore
 
@@ -36,7 +37,7 @@ class Run:
 @dataclass(frozen=True, kw_only=True)
 class Group:
     """Runs that differ by seed only. `faults`: the fault set's label. `baseline`, `method`: names of
-    pipelines; the method is None where only one pipeline ran."""
+    pipelines; the method is None where only one pipeline ran. `told`: which calibration pipelines know."""
 
     scenario: str
     system: str
@@ -45,6 +46,7 @@ class Group:
     pipelines: tuple[str, ...]
     baseline: str
     method: str | None
+    told: Told = "true"
 
     @property
     def sides(self) -> tuple[str, ...]:
@@ -65,22 +67,22 @@ class Group:
 
 
 def groups_of(results: Sequence[JobResult]) -> tuple[Group, ...]:
-    """Groups in the order of the results. A clean result belongs to every set of faults of its scenario and
-    system; where there is none it makes a group of its own."""
-    labels: dict[tuple[str, str], dict[str, None]] = {}
+    """Groups in the order of the results. A clean result belongs to every set of faults of its scenario,
+    system and told calibration; where there is none it makes a group of its own."""
+    labels: dict[tuple[str, str, Told], dict[str, None]] = {}
     for r in results:
-        found = labels.setdefault((r.scenario.name, r.job.system), {})
+        found = labels.setdefault((r.scenario.name, r.job.system, r.job.told), {})
         if len(r.faults):
             found[r.faults.label] = None
     return tuple(
-        _group(scenario, system, label, results)
-        for (scenario, system), by_label in labels.items()
+        _group(label, [r for r in results if (r.scenario.name, r.job.system, r.job.told) == key])
+        for key, by_label in labels.items()
         for label in by_label or {"none": None}
     )
 
 
-def _group(scenario: str, system: str, label: str, results: Sequence[JobResult]) -> Group:
-    ours = [r for r in results if r.scenario.name == scenario and r.job.system == system]
+def _group(label: str, ours: Sequence[JobResult]) -> Group:
+    first = ours[0]
     clean = {r.job.seed: r for r in ours if not len(r.faults)}
     faulted = {r.job.seed: r for r in ours if len(r.faults) and r.faults.label == label}
     named = list(dict.fromkeys(name for r in ours for name in r.job.pipelines))
@@ -88,8 +90,8 @@ def _group(scenario: str, system: str, label: str, results: Sequence[JobResult])
     others = [name for name in named if name != baseline]
     method = METHOD if METHOD in others else (others[-1] if others else None)
     return Group(
-        scenario=scenario,
-        system=system,
+        scenario=first.scenario.name,
+        system=first.job.system,
         faults=label,
         runs=tuple(
             Run(seed=s, clean=clean.get(s), faulted=faulted.get(s)) for s in sorted({*clean, *faulted})
@@ -97,6 +99,7 @@ def _group(scenario: str, system: str, label: str, results: Sequence[JobResult])
         pipelines=tuple(named),
         baseline=baseline,
         method=method,
+        told=first.job.told,
     )
 
 

@@ -40,6 +40,7 @@ from simbench.report.words import (
     points,
     runs_words,
     sentence,
+    told_words,
 )
 from simbench.score.statistics import MIN_RUNS
 
@@ -122,6 +123,7 @@ class Section:
     faults: str
     shake: str
     stamps: str
+    told: str
     median: Shot | None
     worst: Shot | None
     panels: tuple[Panel, ...]
@@ -248,12 +250,13 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
         except BadInput as why:
             explained = f"Pictures and histogram could not be made again: {why}"
     return Section(
-        title=f"{group.scenario}, {group.system}",
+        title=f"{group.scenario}, {group.system}" + (", calibration found" if group.told == "found" else ""),
         anchor=f"group-{number}",
         group=group,
         faults=fault_words(sample.faults) if len(sample.faults) else "no injected errors",
         shake=sample.shake,
         stamps=stamps,
+        told=told_words(group.told, is_recorded(sample.job.scenario)),
         median=median,
         worst=worst,
         panels=panels,

@@ -9,7 +9,7 @@ from scenarios.seeding import stream
 from simbench.case import ORACLE, JobResult
 from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Status
 from simbench.report.choose import Group, case_of
-from simbench.report.words import NONE, pipeline_words
+from simbench.report.words import NONE, pipeline_words, told_words
 from simbench.results import latency_ms
 from simbench.score.metrics import METRICS
 from simbench.score.statistics import summarize
@@ -208,7 +208,7 @@ class Badge:
 
 
 def badges(results: Sequence[JobResult], groups: Sequence[Group]) -> tuple[Badge, ...]:
-    """Cases, receipts, and what the shake is in the world."""
+    """Cases, receipts, a calibration that is not the true one, and what the shake is in the world."""
     found = []
     cases = [c for r in results for c in r.cases]
     bad = sum(c.status != "ok" for c in cases)
@@ -222,6 +222,8 @@ def badges(results: Sequence[JobResult], groups: Sequence[Group]) -> tuple[Badge
         count = statuses.count(status)
         if count:
             found.append(Badge(text=f"receipts {status}: {count} of {len(statuses)}", tone=tone))
+    if any(result.job.told == "found" for result in results):
+        found.append(Badge(text="calibration: found", tone="plain", title=told_words("found", False)))
     if not statuses:
         found.append(Badge(text="no errors injected, no receipts", tone="plain"))
     shakes: dict[tuple[str, str], str] = {}

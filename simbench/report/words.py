@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scenarios.fault_set import FaultSet
 from scenarios.faults import RoadShake
 from scenarios.scenario import CameraSensor, ends
-from simbench.case import ORACLE
+from simbench.case import ORACLE, Told
 from simbench.report.choose import Group, mean_of_runs
 from simbench.score.statistics import MIN_RUNS
 
@@ -83,6 +83,15 @@ def fault_words(faults: FaultSet) -> str:
 def _road_words(spec: RoadShake) -> str:
     road = "a smooth road" if spec.roughness == "smooth" else f"a road of ISO class {spec.roughness}"
     return f"{road} with {counted(len(spec.events), 'event')}" if spec.events else road
+
+
+def told_words(told: Told, recorded: bool) -> str:
+    """Which calibration the pipelines know, as a sentence."""
+    if recorded:
+        return "Pipelines are told the calibration that the recording brings."
+    if told == "true":
+        return "Pipelines are told the true calibration (before any error of it)."
+    return "Pipelines are told the calibration that was found on boards; scores are by the true one."
 
 
 def joined(words: Sequence[str]) -> str:

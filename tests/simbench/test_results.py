@@ -73,7 +73,7 @@ def test_the_same_seeds_give_the_same_bytes_but_for_timings(found: tuple[JobResu
 
 def test_every_case_has_one_row_per_metric(content: dict[str, list[dict[str, object]]]) -> None:
     assert content["schema"] == "simbench-result/1"
-    keys = ("scenario", "system", "pipeline", "seed", "faults")
+    keys = ("scenario", "system", "pipeline", "seed", "faults", "calibration")
     cases = {tuple(case[k] for k in keys) for case in content["cases"]}
     assert len(cases) == len(content["cases"]) == 12
     rows = [(*(row[k] for k in keys), row["metric"]) for row in content["rows"]]
@@ -113,6 +113,22 @@ def test_a_summary_stands_for_every_group_and_metric(content: dict[str, list[dic
     assert len(content["summary"]) == 2 * 3 * len(METRICS)
     for item in content["summary"]:
         assert item.get("ci95") is None  # two runs are an illustration
+
+
+def test_rows_of_a_found_calibration_can_be_told_from_those_of_the_true_one(
+    found: tuple[JobResult, ...], tmp_path: Path
+) -> None:
+    other = replace(found[0], job=replace(found[0].job, calibration="found:my.yaml", found_in="my.yaml"))
+    content = document((found[0], other), {})
+    for part in ("rows", "cases", "timings", "summary"):
+        told = [item["calibration"] for item in content[part]]
+        assert told == ["true"] * (len(told) // 2) + ["found"] * (len(told) // 2) and told
+    assert all("--calibration found:my.yaml" in c["command"] for c in content["cases"][3:])
+    assert all(item["n"] <= 1 for item in content["summary"])  # never averaged over both
+    write((found[0], other), tmp_path, {})
+    for table in ("pairs", "frames"):
+        rows = csv.DictReader(io.StringIO((tmp_path / f"{table}.csv").read_text(encoding="utf-8")))
+        assert {row["calibration"] for row in rows} == {"true", "found"}
 
 
 def test_timings_are_rows_of_the_same_shape(content: dict[str, list[dict[str, object]]]) -> None:

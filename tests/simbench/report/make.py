@@ -203,8 +203,10 @@ def result(
     crash: Sequence[str] = (),
     measured: float | None = 50.1,
     shift: float = 0.0,
+    found_in: str | None = None,
 ) -> JobResult:
-    """A result with 12 pairs per case. `tpr`: by pipeline, per pair; else drawn."""
+    """A result with 12 pairs per case. `tpr`: by pipeline, per pair; else drawn. `found_in`: a file with a
+    found calibration."""
     g = rng("tpr", seed, errors, system)
     by_pipeline = {
         name: list((tpr or {}).get(name, np.round(g.uniform(0.1, 0.9, 12), 2)))
@@ -217,7 +219,15 @@ def result(
     )
     drawn = faults(*errors)
     return JobResult(
-        job=Job(scenario=scenario, system=system, seed=seed, pipelines=pipelines, faults=errors or ("none",)),
+        job=Job(
+            scenario=scenario,
+            system=system,
+            seed=seed,
+            pipelines=pipelines,
+            faults=errors or ("none",),
+            calibration="true" if found_in is None else f"found:{found_in}",
+            found_in=found_in,
+        ),
         scenario=concrete(SCENARIO, seed),
         faults=drawn,
         shake="pitch 1.10 deg RMS: ISO 8608 road class E on this vehicle" if errors else "",

@@ -66,6 +66,11 @@ def test_one_clean_run_serves_every_set_of_faults() -> None:
     assert groups[0].runs[0].clean is groups[1].runs[0].clean
 
 
+def test_runs_with_another_calibration_are_no_sides_of_one_another() -> None:
+    groups = groups_of([result(), result(errors=("demo",)), result(errors=("demo",), found_in="a.yaml")])
+    assert [(g.told, g.sides) for g in groups] == [("true", ("clean", "faulted")), ("found", ("faulted",))]
+
+
 def test_systems_and_scenarios_are_groups_of_their_own() -> None:
     groups = groups_of([result(), result(system="wearable"), without_target()])
     assert [(g.scenario, g.system, g.has_target()) for g in groups] == [

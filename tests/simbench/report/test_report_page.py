@@ -185,6 +185,13 @@ def test_from_six_runs_on_there_are_intervals(tmp_path: Path) -> None:
     assert re.search(r"<small>\[[\d.]+, [\d.]+\]</small>", text)
 
 
+def test_the_page_says_which_calibration_the_pipelines_were_told(page: str, tmp_path: Path) -> None:
+    assert "told the true calibration" in Page(page).text and "calibration: found" not in page
+    text = Page(make([result(), result(found_in="a.yaml")], tmp_path)).text
+    assert "told the true calibration" in text and "told the calibration that was found" in text
+    assert "calibration: found" in text and "-approach, car, calibration found" in text
+
+
 def test_names_are_escaped_wherever_they_come_from(tmp_path: Path) -> None:
     evil = "<b>&\"'x"
     bad = result(errors=("demo",), pipelines=(evil, "<i>two"), crash=("<i>two",))
