@@ -164,6 +164,7 @@ def write_report(
         sections=sections,
         dots=figures.paired_dots(groups) if any(g.has_target() for g in groups) else None,
         definitions=tables.DEFINITIONS,
+        names=tables.name_lines(groups),
         receipts=tables.receipt_lines(results),
         failed=[(r, c) for r in results for c in r.cases if c.status != "ok"],
         not_shown=_not_shown(groups, images, recorded),

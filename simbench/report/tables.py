@@ -9,6 +9,7 @@ from scenarios.seeding import stream
 from simbench.case import ORACLE, JobResult
 from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Status
 from simbench.report.choose import Group, case_of
+from simbench.report.names import OURS
 from simbench.report.words import NONE, pipeline_words, told_words
 from simbench.results import latency_ms
 from simbench.score.metrics import METRICS
@@ -94,6 +95,27 @@ def lines(group: Group) -> tuple[Line, ...]:
     """All pipelines and the oracle, without and with errors."""
     names = [*group.pipelines, *([ORACLE] if group.has_target() else [])]
     return tuple(_line(group, side, name) for name in names for side in group.sides)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NameLine:
+    """What a pipeline of the tables is: its words, its name on the command line, what it takes."""
+
+    words: str
+    pipeline: str
+    takes: str
+
+
+def name_lines(groups: Sequence[Group]) -> tuple[NameLine, ...]:
+    """One line for each of our own pipelines that ran, and for the oracle where there is one."""
+    named = dict.fromkeys(name for group in groups for name in group.pipelines)
+    if any(group.has_target() for group in groups):
+        named[ORACLE] = None
+    return tuple(
+        NameLine(words=OURS[name].name, pipeline="" if name == ORACLE else name, takes=OURS[name].takes)
+        for name in named
+        if name in OURS
+    )
 
 
 def _line(group: Group, side: str, pipeline: str) -> Line:

@@ -7,33 +7,24 @@ from collections.abc import Sequence
 from scenarios.fault_set import FaultSet
 from scenarios.faults import RoadShake
 from scenarios.scenario import CameraSensor, ends
-from simbench.case import ORACLE, Told
+from simbench.case import Told
 from simbench.report.choose import Group, mean_of_runs
+from simbench.report.names import OURS
 from simbench.score.statistics import MIN_RUNS
 
 NONE = "–"
-_LONG = {
-    "static_projection": "raw box",
-    "static_projection_ground": "raw box, ground removed",
-    "probabilistic": "six steps",
-    "probabilistic_paper": "six steps as printed",
-    ORACLE: "oracle",
-}
-_SHORT = {
-    "static_projection": "raw box",
-    "static_projection_ground": "no ground",
-    "probabilistic": "six steps",
-    "probabilistic_paper": "as printed",
-}
 MOST_CLAUSES = 2
 
 
 def pipeline_words(name: str, short: bool = False) -> str:
     """Plain words for our own pipelines; a user's keeps its name (cut for axes)."""
-    if short:
-        known = _SHORT.get(name, name.rpartition(":")[2] or name)
-        return known if len(known) <= 14 else known[:13] + "…"
-    return _LONG.get(name, name)
+    known = OURS.get(name)
+    if known is not None:
+        return known.short if short else known.name
+    if not short:
+        return name
+    last = name.rpartition(":")[2] or name
+    return last if len(last) <= 14 else last[:13] + "…"
 
 
 def percent(share: float | None, digits: int = 1) -> str:

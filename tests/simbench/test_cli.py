@@ -315,6 +315,17 @@ def test_the_exit_code_is_that_of_the_worst_case(
     assert (out / "result.json").is_file() and (out / "report.html").is_file()
 
 
+def test_a_run_compares_the_paper_with_ours_and_the_demo_stays_with_the_paper() -> None:
+    planned: list[Job] = []
+    papers = ("static_projection", "static_projection_ground", "probabilistic")
+    with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+        assert run("run", "overtake-recede", "--seeds", "0").exit_code == 0
+        assert {job.pipelines for job in planned} == {(*papers, "robust")}
+        planned.clear()
+        assert run("demo").exit_code == 0
+        assert {job.pipelines for job in planned} == {papers}
+
+
 def test_a_scenario_may_be_named_twice_without_counting_twice(short: None, tmp_path: Path) -> None:
     scenario = load_scenario("overtake-recede").resolve(0)
     path = str(write_scenario(tmp_path, scenario))

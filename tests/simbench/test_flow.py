@@ -57,6 +57,6 @@ def test_a_run_leaves_result_tables_scenario_and_report(short: str, tmp_path: Pa
     assert {"scenario-short-0.yaml", "scenario-short-1.yaml"} <= made
     content = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert {case["pipeline"] for case in content["cases"]} == {
-        "static_projection", "static_projection_ground", "probabilistic", "oracle",
+        "static_projection", "static_projection_ground", "probabilistic", "robust", "oracle",
     }  # fmt: skip
     assert {case["status"] for case in content["cases"]} == {"ok"}

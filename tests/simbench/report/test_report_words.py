@@ -9,7 +9,10 @@ import pytest
 
 from scenarios.load import load_sensor
 from scenarios.scenario import CameraSensor
+from simbench.case import ORACLE
+from simbench.plugins import pipeline_names
 from simbench.report.choose import groups_of, mean_of_runs
+from simbench.report.names import OURS
 from simbench.report.words import (
     fault_words,
     joined,
@@ -52,6 +55,16 @@ def test_faults_are_named_with_the_number_that_sets_them() -> None:
     assert fault_words(faults("motion.road=C")) == "a road of ISO class C"
     bump = "motion.road={events: [{kind: bump, at_m: 30, height_m: 0.08, length_m: 0.9}]}"
     assert fault_words(faults(bump)) == "a smooth road with 1 event"
+
+
+def test_every_pipeline_that_is_installed_has_plain_words_of_its_own() -> None:
+    ours = [name for name in pipeline_names() if ":" not in name]
+    assert set(OURS) - {ORACLE} == set(ours) and len(ours) == 8
+    for words in ("name", "short", "takes"):
+        assert len({getattr(OURS[name], words) for name in OURS}) == len(OURS)
+    for plain in OURS.values():
+        assert len(plain.short) <= 14 and len(plain.name) <= 30
+        assert plain.takes.endswith(".") and "_" not in plain.name + plain.short + plain.takes
 
 
 def test_our_pipelines_have_plain_names_and_a_users_keeps_its_own() -> None:
