@@ -8,6 +8,7 @@ from typing import Literal
 
 from scenarios.fault_set import FaultSet
 from scenarios.scenario import Scenario
+from simbench.distances import Distances
 from simbench.drive import Driven
 from simbench.exhibit import PairView
 from simbench.faults.receipt import Receipt
@@ -77,6 +78,7 @@ class JobResult:
     receipts: tuple[Receipt, ...]
     cases: tuple[Case, ...]
     views: tuple[PairView, ...] = ()
+    distances: Distances = field(default_factory=Distances)
     timings_s: Mapping[str, float] = field(default_factory=dict)
 
 

@@ -14,6 +14,7 @@ from typing import Protocol, runtime_checkable
 from scenarios.fault_set import FaultSet
 from scenarios.scenario import Scenario
 from simbench.case import ORACLE, Case, Job, JobResult, failed, scored
+from simbench.distances import Distances, distances
 from simbench.drive import drive
 from simbench.exhibit import PairView, pair_views
 from simbench.faults.draw import shake_words
@@ -78,10 +79,10 @@ def _guarded(
 ) -> JobResult:
     try:
         made = make()
-        cases, views = _score(job, made, clock)
+        cases, views, curves = _score(job, made, _others(scenario, job.system), clock)
         return JobResult(
             job=job, scenario=scenario, faults=faults, shake=made.shake, receipts=made.receipts, cases=cases,
-            views=views, timings_s=clock.laps,
+            views=views, distances=curves, timings_s=clock.laps,
         )  # fmt: skip
     except Exception as error:  # a bug of ours must not end the other jobs, nor pass for a result
         why = _last_line(error)
@@ -89,16 +90,27 @@ def _guarded(
         return JobResult(job=job, scenario=scenario, faults=faults, shake="", receipts=(), cases=bad)
 
 
-def _score(job: Job, made: Made, clock: Clock) -> tuple[tuple[Case, ...], tuple[PairView, ...]]:
+def _others(scenario: Scenario | RecordedScene, system: str) -> tuple[str, ...]:
+    """The actors around the ego: whose distances are kept. None of recorded data, where one camera sees."""
+    if isinstance(scenario, RecordedScene):
+        return ()
+    played = scenario.system(system)
+    return tuple(name for name in played.actors if name != played.ego)
+
+
+def _score(
+    job: Job, made: Made, others: tuple[str, ...], clock: Clock
+) -> tuple[tuple[Case, ...], tuple[PairView, ...], Distances]:
     cases = [run_case(name, made) for name in job.pipelines]
     clock.lap("fusion and scores")
     if made.recording.truth.target_id is not None:
         cases.append(scored(ORACLE, score_oracles(made.recording), None))
     driven = {case.pipeline: case.driven.outputs for case in cases if case.driven is not None}
     views = pair_views(made.recording, driven)
+    curves = distances(made.recording, driven, others)
     clock.lap("oracle and views")
     bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
-    return tuple(_spoiled(case, bad) if bad else case for case in cases), views
+    return tuple(_spoiled(case, bad) if bad else case for case in cases), views, curves
 
 
 @runtime_checkable

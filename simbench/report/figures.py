@@ -81,7 +81,7 @@ def _style() -> AbstractContextManager[None]:
     return matplotlib.rc_context(dict(STYLE))  # type: ignore[arg-type]
 
 
-def _draw(width: float, height: float, label: str, draw: Callable[[Any], None]) -> Markup:
+def as_svg(width: float, height: float, label: str, draw: Callable[[Any], None]) -> Markup:
     """A figure of width x height user units as inline SVG."""
     with _style():
         from matplotlib.backends.backend_svg import FigureCanvasSVG
@@ -114,7 +114,7 @@ def inline(svg: str, label: str) -> Markup:
     return opening + Markup(rest.strip())
 
 
-def _grid(axes: Any, which: str = "y") -> None:
+def grid(axes: Any, which: str = "y") -> None:
     axes.grid(visible=True, axis=which)
     axes.tick_params(length=0)
 
@@ -137,11 +137,11 @@ def paired_dots(groups: Sequence[Group]) -> Markup:
             row[0].set_ylabel("TPR (%)")
         _pairing_legend(figure, groups)
 
-    return _draw(COLUMN, 164.0 + 212.0 * rows, "TPR per run, from baseline to method", draw)
+    return as_svg(COLUMN, 164.0 + 212.0 * rows, "TPR per run, from baseline to method", draw)
 
 
 def _one_pairing(axes: Any, group: Group) -> None:
-    _grid(axes)
+    grid(axes)
     axes.set_ylim(-4, 104)
     axes.set_yticks([0, 20, 40, 60, 80, 100])
     axes.set_xlim(-0.45, 1.45)
@@ -219,7 +219,7 @@ def birds_eye(result: JobResult, pipeline: str, like: Sequence[str]) -> Markup |
 
     def draw(figure: Any) -> None:
         axes = figure.subplots()
-        _grid(axes, "both")
+        grid(axes, "both")
         _true_paths(axes, frames)
         lost = 0
         stages: list[tuple[str, dict[str, Any]]] = [
@@ -252,7 +252,7 @@ def birds_eye(result: JobResult, pipeline: str, like: Sequence[str]) -> Markup |
                 color=palette.RAW,
             )
 
-    return _draw(COLUMN, 168.0, f"Bird's-eye view of {pipeline_words(pipeline)}", draw)
+    return as_svg(COLUMN, 168.0, f"Bird's-eye view of {pipeline_words(pipeline)}", draw)
 
 
 def _true_paths(axes: Any, frames: Sequence[FrameScore]) -> None:
@@ -322,7 +322,7 @@ def budget_bars(
         axes = figure.subplots(1, 2, sharey=True)
         rows = np.arange(len(parts))
         for axis, (cell, name) in enumerate(zip(axes, ("longitudinal", "lateral"), strict=True)):
-            _grid(cell, "x")
+            grid(cell, "x")
             values = np.array([means[p][:, axis].mean() for p in parts])
             colours = [palette.INK if p == "total" else palette.METHOD for p in parts]
             cell.barh(rows, values, height=0.62, color=colours, alpha=0.85)
@@ -344,7 +344,7 @@ def budget_bars(
         axes[0].set_yticks(rows, [BUDGET_WORDS[p] for p in parts])
         axes[0].invert_yaxis()
 
-    return _draw(COLUMN, 212.0, f"Signed error budget of {pipeline_words(pipeline)}", draw)
+    return as_svg(COLUMN, 212.0, f"Signed error budget of {pipeline_words(pipeline)}", draw)
 
 
 # -- over frames, and inside one frame ------------------------------------------------------------------
@@ -374,7 +374,7 @@ def tpr_over_frames(group: Group, run: Run) -> Markup | None:
 
     def draw(figure: Any) -> None:
         axes = figure.subplots()
-        _grid(axes)
+        grid(axes)
         for t, share, colour, line, words in reversed(curves):
             axes.plot(t, share, line, color=colour, lw=1.4, marker="o", ms=2.6, label=words)
         axes.set_ylim(-4, 104)
@@ -382,7 +382,7 @@ def tpr_over_frames(group: Group, run: Run) -> Markup | None:
         axes.set_ylabel("TPR (%)")
         figure.legend(loc="outside upper center", ncols=2, handletextpad=0.5, columnspacing=1.4)
 
-    return _draw(COLUMN, 250.0, f"TPR over frames, seed {run.seed}", draw)
+    return as_svg(COLUMN, 250.0, f"TPR over frames, seed {run.seed}", draw)
 
 
 def distance_modes(found: AoiExplanation, surface_m: float | None) -> Markup:
@@ -393,7 +393,7 @@ def distance_modes(found: AoiExplanation, surface_m: float | None) -> Markup:
 
     def draw(figure: Any) -> None:
         axes = figure.subplots()
-        _grid(axes)
+        grid(axes)
         if len(histogram.counts):
             colours = [
                 palette.METHOD
@@ -443,7 +443,7 @@ def distance_modes(found: AoiExplanation, surface_m: float | None) -> Markup:
             handles=entries, loc="outside upper center", ncols=3, handletextpad=0.5, columnspacing=1.4
         )
 
-    return _draw(COLUMN, 250.0, "Histogram of distances", draw)
+    return as_svg(COLUMN, 250.0, "Histogram of distances", draw)
 
 
 MOST_CANDIDATES = 3
@@ -478,7 +478,7 @@ def descriptors(found: AoiExplanation) -> Markup:
             words = "one candidate:\nthe shape decides nothing" if listed else "no candidate"
             axes[0, -2].text(1.1, 0.5, words, ha="center", va="center", color=palette.MUTED)
 
-    return _draw(COLUMN, 250.0, "Shape descriptors", draw)
+    return as_svg(COLUMN, 250.0, "Shape descriptors", draw)
 
 
 def _cells(axes: Any, shares: np.ndarray, title: str, chosen: bool) -> None:

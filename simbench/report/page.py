@@ -18,6 +18,13 @@ from simbench.files import write_text
 from simbench.formats.kitti import is_recorded
 from simbench.formats.scene import RecordedScene
 from simbench.report import figures, palette, tables
+from simbench.report.agreement import (
+    AgreementLine,
+    agreement_lines,
+    drawn_pipelines,
+    is_shown,
+    scored_curves,
+)
 from simbench.report.choose import (
     Group,
     Instant,
@@ -27,6 +34,7 @@ from simbench.report.choose import (
     pairs_of,
     views_of,
 )
+from simbench.report.distance_figure import distance_figure
 from simbench.report.objects import MOST_LINES, object_tables
 from simbench.report.overlay import Marks, common_field, crop_svg, cut, jpeg_uri, marks_of
 from simbench.report.pictures import Replayed, explain_view, replay_of, take_pictures
@@ -35,6 +43,7 @@ from simbench.report.words import (
     counted,
     fault_words,
     joined,
+    metres,
     percent,
     pipeline_words,
     points,
@@ -107,6 +116,15 @@ class Panel:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Joined:
+    """The distance curves of one pipeline in one run."""
+
+    title: str
+    note: str
+    svg: Markup
+
+
+@dataclass(frozen=True, kw_only=True)
 class Video:
     name: str
     poster: str
@@ -132,6 +150,8 @@ class Section:
     modes: Markup | None
     shapes: Markup | None
     explained: str
+    distances: tuple[Joined, ...]
+    agreement: tuple[AgreementLine, ...]
     columns: tuple[tables.Column, ...]
     heads: tuple[tuple[str, int], ...]
     lines: tuple[tables.Line, ...]
@@ -175,6 +195,7 @@ def write_report(
         command=command,
         images=images,
         stills=RECORDED_STILLS[images] if recorded else STILLS[images],
+        metres=metres,
         c=palette,
     )
     path = out / "report.html"
@@ -234,11 +255,13 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
     median = worst = modes = shapes = over_frames = None
     explained, stamps, seed = "", "", None
     panels: tuple[Panel, ...] = ()
+    shown = sample
     if chosen is not None:
         run = chosen[0].run
         seed = run.seed
-        shown = run.side(group.main_side)
-        assert shown is not None
+        played = run.side(group.main_side)
+        assert played is not None
+        shown = played
         pipelines = [name for name in (group.baseline, group.method) if name is not None]
         panels = tuple(_panel(group, shown, name, pipelines) for name in pipelines)
         over_frames = figures.tpr_over_frames(group, run)
@@ -266,10 +289,28 @@ def _section(group: Group, number: int, *, images: Images, out: Path) -> Section
         modes=modes,
         shapes=shapes,
         explained=explained,
+        distances=_joined_curves(group, shown),
+        agreement=agreement_lines(group),
         columns=tables.columns(group),
         heads=tables.heads(tables.columns(group)),
         lines=tables.lines(group),
         videos=_videos(group, out),
+    )
+
+
+def _joined_curves(group: Group, shown: JobResult) -> tuple[Joined, ...]:
+    """The figure of distances, where several cameras see several objects."""
+    drawn = [(name, scored_curves(shown, name)) for name in drawn_pipelines(group)]
+    if not is_shown([shown], group.pipelines):
+        return ()
+    return tuple(
+        Joined(
+            title=f"{'Error' if group.main_side == 'faulted' else 'No error'}, {pipeline_words(name)}",
+            note=f"seed {shown.job.seed}",
+            svg=distance_figure(shown.distances.true, curves, f"Distances by {pipeline_words(name)}"),
+        )
+        for name, curves in drawn
+        if curves
     )
 
 

@@ -23,6 +23,15 @@ RAW = "#D55E00"  # the baseline under errors
 METHOD = "#0072B2"  # the method under errors
 ORACLE = "#1B1F24"
 OTHER = "#9467A6"
+OBJECTS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#B5478F",
+    "#E69F00",
+    "#56B4E9",
+    "#1B1F24",
+)  # one each, then again
 
 
 def bgr(colour: str) -> tuple[int, int, int]:
