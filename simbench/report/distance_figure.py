@@ -7,6 +7,7 @@ object, on a scale that is linear up to 0.1 m and logarithmic beyond.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -71,12 +72,15 @@ def _with_gaps(curve: Curve) -> tuple[np.ndarray, np.ndarray]:
 def _legend(figure: Any, colours: dict[str, str], marks: dict[str, str]) -> None:
     from matplotlib.lines import Line2D
 
-    entries = [Line2D([], [], color=colour, lw=2.4, label=name) for name, colour in colours.items()]
-    entries += [
+    objects = [Line2D([], [], color=colour, lw=2.4, label=name) for name, colour in colours.items()]
+    objects.append(Line2D([], [], color=palette.INK, lw=0.9, label="truth (centre)"))
+    cameras = [
         Line2D([], [], ls="", marker=mark, mfc="none", color=palette.INK, ms=5.5, label=camera)
         for camera, mark in marks.items()
     ]
-    entries.append(Line2D([], [], color=palette.INK, lw=0.9, label="truth (centre)"))
+    nothing = Line2D([], [], ls="", label=" ")
+    columns = list(zip_longest(objects, cameras, fillvalue=nothing))  # a legend is filled column by column
     figure.legend(
-        handles=entries, loc="outside upper center", ncols=6, handletextpad=0.5, columnspacing=1.3
+        handles=[entry for column in columns for entry in column], loc="outside upper center",
+        ncols=len(columns), handletextpad=0.5, columnspacing=1.3,
     )  # fmt: skip

@@ -37,8 +37,8 @@ def points(difference: float) -> str:
     return f"{_unsigned_zero(100.0 * difference, 1):+.1f}".replace("-", "−")
 
 
-def metres(value: float | None) -> str:
-    return NONE if value is None else f"{value:.2f}"
+def metres(value: float | None, digits: int = 2) -> str:
+    return NONE if value is None else f"{value:.{digits}f}"
 
 
 def signed_m(value: float) -> str:

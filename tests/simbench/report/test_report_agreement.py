@@ -127,6 +127,6 @@ def test_the_page_shows_figure_and_table_only_where_cameras_can_be_compared(tmp_
 
     text = page(with_curves(*TWO))
     assert 'aria-label="Distances by six steps"' in text and 'table class="agreement"' in text
-    assert re.search(r"<td>4</td><td>0\.20</td><td>0\.50<small>walker, 0\.1 s</small>", text)
+    assert re.search(r"<td>4</td><td>0\.200</td><td>0\.500<small>walker, 0\.1 s</small>", text)
     without = page(with_curves(*TWO[:2]))
     assert "Distances by" not in without and 'class="agreement"' not in without
