@@ -72,7 +72,6 @@ def sweep(
     shot = aim(name, motion, table, start_ns, draws.azimuth_noise, draws.elevation_noise, sd_rad, course)
     points = returns.deliver(sensor, table, _echoes(sensor, shot), draws)
 
-    offset_ns = table.fire_offset_ns[points.column, points.beam]
     scan = LidarScan(
         sensor=name,
         seq=seq,
@@ -80,7 +79,7 @@ def sweep(
         arrival_ns=int(shot.instant_ns[-1]) + round(sensor.latency_ms * 1e6),
         xyz_m=points.xyz_m,
         intensity=points.intensity,
-        offset_ns=offset_ns.astype(np.int32),
+        offset_ns=points.offset_ns.astype(np.int32),
         ring=points.beam,
     )
     truth = ScanTruth(
@@ -89,7 +88,7 @@ def sweep(
         object_id=np.where(points.part >= 0, motion.world.geom_object[points.part], GROUND).astype(np.int32),
         part_id=points.part,
         true_range_m=points.true_range_m,
-        fire_ns=start_ns + offset_ns,
+        fire_ns=start_ns + points.offset_ns,
         incidence_rad=points.incidence_rad,
     )
     return scan, truth

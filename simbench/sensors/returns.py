@@ -8,19 +8,22 @@ the sensor does). A beam without a return may have a false one.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Float, Float32, Float64, Int16, Int32
+from jaxtyping import Float, Float32, Float64, Int16, Int32, Int64
 
+from fusion.geometry import readonly
 from scenarios.scenario import LidarSensor
 from simbench.sensors import rays
 from simbench.sensors.beams import BeamTable
 from simbench.sensors.compiled import jit
-from simbench.sensors.noise import standard_normal
+from simbench.sensors.noise import standard_normal, standard_uniform
 
 SOFT_EDGE = 0.04  # relative width of the logistic fall of detection probability at R(rho) [judgement]
 MAX_FALSE_RANGE_M = 100.0
 LOG_SURE = np.log(1.0 - 17.0 * SOFT_EDGE)  # nearer, the chance of a miss is under that of the smallest draw
+BACK_STEPS = 256  # of reflectivity, in the table of ranges of sure returns
 FALSE_INTENSITY = 0.02  # a false return is as weak as what the sensor just detects [judgement]
 
 
@@ -55,10 +58,10 @@ class Draws:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Points:
-    """The points of one sweep in firing order. column, beam: which beam made each one; part -1: a false
-    return."""
+    """The points of one sweep in firing order. offset_ns: when each one's beam fired, from the sweep's start;
+    beam: which of its column that was; part -1: a false return."""
 
-    column: Int32[np.ndarray, " n"]
+    offset_ns: Int64[np.ndarray, " n"]
     beam: Int16[np.ndarray, " n"]
     xyz_m: Float32[np.ndarray, "n 3"]
     intensity: Float32[np.ndarray, " n"]
@@ -71,7 +74,7 @@ def draw(sensor: LidarSensor, rng: np.random.Generator) -> Draws:
     """Draw everything. Dropout has a stream of its own, so that it moves no other number."""
     shape = (sensor.columns, len(sensor.elevation_deg))
     normal = standard_normal(rng, (3, *shape))
-    uniform = rng.random((3, *shape), dtype=np.float32)
+    uniform = standard_uniform(rng, (3, *shape))
     dropout = uniform[0]  # looked at only where the rate is above 0
     if sensor.dropout_rate > 0.0:
         dropout = rng.spawn(1)[0].random(shape, dtype=np.float32)
@@ -138,24 +141,24 @@ def deliver(
 ) -> Points:
     """The points that the sensor reports along its nominal directions (LiDAR frame)."""
     n = table.fire_offset_ns.size
-    column, beam, part = np.empty(n, np.int32), np.empty(n, np.int16), np.empty(n, np.int32)
+    offset, beam, part = np.empty(n, np.int64), np.empty(n, np.int16), np.empty(n, np.int32)
     xyz, intensity = np.empty((n, 3), np.float32), np.empty(n, np.float32)
     true_range, upright = np.empty(n), np.empty(n, np.float32)
     strengths, sd = _noise_levels(sensor)
     off = sensor.off
     count = _deliver(
         echoes.range_m, echoes.true_range_m, echoes.geom, echoes.cosine, echoes.reflectivity,
-        table.direction, table.order, table.instant, table.place, len(table.slots),
+        table.direction, table.fire_offset_ns, table.order, table.instant, table.place, len(table.slots),
         draws.range_noise, draws.detection, draws.false_return, draws.false_range, draws.dropout,
         "range_law" not in off, np.log(sensor.range_at_10_percent_m), _exponent(sensor),
-        strengths, np.zeros(3) if "range_noise" in off else sd,
+        strengths, _surely_strong_m(sensor), np.zeros(3) if "range_noise" in off else sd,
         0.0 if "resolution" in off else sensor.resolution_m, sensor.min_range_m,
         0.0 if "dropout" in off else sensor.dropout_rate,
         0.0 if "false_positives" in off else sensor.false_positive_rate,
-        column, beam, part, xyz, intensity, true_range, upright,
+        offset, beam, part, xyz, intensity, true_range, upright,
     )  # fmt: skip
     return Points(
-        column=column[:count],
+        offset_ns=offset[:count],
         beam=beam[:count],
         xyz_m=xyz[:count],
         intensity=intensity[:count],
@@ -176,6 +179,15 @@ def _noise_levels(sensor: LidarSensor) -> tuple[Float64[np.ndarray, "3"], Float6
     return strengths, np.array([noise.low_m, noise.medium_m, noise.high_m])
 
 
+@lru_cache(maxsize=8)
+def _surely_strong_m(sensor: LidarSensor) -> Float64[np.ndarray, " n"]:
+    """To what range a return of reflectivity i / BACK_STEPS or more is surely detected and of high strength:
+    what does not lie near a limit needs no logarithm."""
+    back = np.arange(2 * BACK_STEPS) / BACK_STEPS
+    share = min(np.exp(LOG_SURE), 1.0 / np.sqrt(sensor.noise.high_strength))
+    return readonly(share * (1.0 - 1e-5) * max_range_m(sensor, back))
+
+
 @jit
 def _send_back(geom, cosine, reflectivity, gain, out):  # type: ignore[no-untyped-def]
     for c in range(geom.shape[0]):
@@ -187,10 +199,10 @@ def _send_back(geom, cosine, reflectivity, gain, out):  # type: ignore[no-untype
 
 @jit
 def _deliver(  # type: ignore[no-untyped-def]
-    range_m, true_m, geom, cosine, reflectivity, direction, order, instant, place, instants,
+    range_m, true_m, geom, cosine, reflectivity, direction, fire_offset, order, instant, place, instants,
     range_noise, detection, false_return, false_range, dropout,
-    law, log_reach_at_10, exponent, strengths, sd, resolution, min_range, dropout_rate, false_rate,
-    out_column, out_beam, out_part, out_xyz, out_intensity, out_true, out_cosine,
+    law, log_reach_at_10, exponent, strengths, sure, sd, resolution, min_range, dropout_rate, false_rate,
+    out_offset, out_beam, out_part, out_xyz, out_intensity, out_true, out_cosine,
 ):  # fmt: skip
     """One pass over the beams in firing order; the number of points."""
     n = 0
@@ -202,26 +214,26 @@ def _deliver(  # type: ignore[no-untyped-def]
             upright = np.float32(0.0)
             if geom[g, k] >= 0 and not dropout[c, b] < dropout_rate:
                 distance, back = range_m[g, k], reflectivity[g, k]
-                log_distance = float(np.log(np.float32(max(distance, 0.1))))
-                log_reach = log_reach_at_10 + exponent * float(np.log(np.float32(max(back, 1e-6) * 10.0)))
-                seen = True
-                if law:
-                    log_share = log_distance - log_reach
-                    if log_share > LOG_SURE:
-                        excess = (np.exp(log_share) - 1.0) / SOFT_EDGE
-                        seen = detection[c, b] < 1.0 / (1.0 + np.exp(min(excess, 60.0)))
+                seen, spread = True, sd[2]
+                if not max(distance, 0.1) < sure[min(int(back * BACK_STEPS), sure.shape[0] - 1)]:
+                    log_distance = float(np.log(np.float32(max(distance, 0.1))))
+                    log_reach = log_reach_at_10 + exponent * float(np.log(np.float32(max(back, 1e-6) * 10.0)))
+                    if law:
+                        log_share = log_distance - log_reach
+                        if log_share > LOG_SURE:
+                            excess = (np.exp(log_share) - 1.0) / SOFT_EDGE
+                            seen = detection[c, b] < 1.0 / (1.0 + np.exp(min(excess, 60.0)))
+                    if seen:
+                        level = 2.0 * (log_reach - log_distance)
+                        if level <= strengths[0]:
+                            spread = sd[0]
+                        elif level < strengths[1]:
+                            share = (level - strengths[0]) / (strengths[1] - strengths[0])
+                            spread = sd[0] + share * (sd[1] - sd[0])
+                        elif level < strengths[2]:
+                            share = (level - strengths[1]) / (strengths[2] - strengths[1])
+                            spread = sd[1] + share * (sd[2] - sd[1])
                 if seen:
-                    level = 2.0 * (log_reach - log_distance)
-                    if level <= strengths[0]:
-                        spread = sd[0]
-                    elif level < strengths[1]:
-                        share = (level - strengths[0]) / (strengths[1] - strengths[0])
-                        spread = sd[0] + share * (sd[1] - sd[0])
-                    elif level < strengths[2]:
-                        share = (level - strengths[1]) / (strengths[2] - strengths[1])
-                        spread = sd[1] + share * (sd[2] - sd[1])
-                    else:
-                        spread = sd[2]
                     measured = distance + range_noise[c, b] * spread
                     if resolution > 0.0:
                         measured = np.rint(measured / resolution) * resolution
@@ -235,7 +247,7 @@ def _deliver(  # type: ignore[no-untyped-def]
                 true = measured
             if measured < min_range:
                 continue
-            out_column[n], out_beam[n], out_part[n] = c, b, part
+            out_offset[n], out_beam[n], out_part[n] = fire_offset[c, b], b, part
             for i in range(3):
                 out_xyz[n, i] = measured * direction[c, b, i]
             out_intensity[n], out_true[n], out_cosine[n] = bright, true, upright

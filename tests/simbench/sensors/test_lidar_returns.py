@@ -176,3 +176,22 @@ def test_the_compiled_laws_are_those_written_out_in_the_module(name: str, motion
     np.testing.assert_allclose(error, expected, rtol=1e-4, atol=1e-5)
     chance = 1.0 / (1.0 + np.exp((truth.true_range_m / reach - 1.0) / returns.SOFT_EDGE))
     assert (draws.detection[column, scan.ring] < chance + 1e-5).all()
+
+
+@pytest.mark.parametrize("name", ["os1-64", "vlp-16"])
+def test_what_is_surely_strong_needs_no_second_look(
+    name: str, motion: Motion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the table of sure ranges empty every return goes the long way: the same bytes."""
+    sensor = load_sensor(name)
+    assert isinstance(sensor, LidarSensor)
+    quick = swept(motion, sensor)
+    sure_m = returns._surely_strong_m(sensor)
+    reach = returns.max_range_m(sensor, quick[0].intensity.astype(np.float64))
+    assert (quick[1].true_range_m < 0.2 * reach).mean() > 0.3  # many of them there are
+    assert (np.diff(sure_m) >= 0.0).all() and sure_m[128] > 0.2 * returns.max_range_m(sensor, np.array(0.5))
+    monkeypatch.setattr(returns, "_surely_strong_m", lambda _: np.zeros_like(sure_m))
+    slow = swept(motion, sensor)
+    for ours, theirs in zip(quick, slow, strict=True):
+        for field in fields(ours):
+            assert np.array_equal(getattr(ours, field.name), getattr(theirs, field.name)), field.name

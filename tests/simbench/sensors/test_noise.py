@@ -1,4 +1,4 @@
-"""Quick normal numbers against the distribution itself."""
+"""Quick normal numbers against the distribution itself, quick uniform ones against NumPy's."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from simbench.sensors.noise import standard_normal
+from simbench.sensors.noise import standard_normal, standard_uniform
 
 
 def numbers(seed: int = 0, count: int = 400_000) -> np.ndarray:
@@ -39,3 +39,10 @@ def test_the_same_seed_gives_the_same_numbers_in_any_shape() -> None:
     flat = standard_normal(np.random.default_rng(3), (30,))
     assert np.array_equal(flat.reshape(2, 3, 5), standard_normal(np.random.default_rng(3), (2, 3, 5)))
     assert not np.array_equal(flat, standard_normal(np.random.default_rng(4), (30,)))
+
+
+@pytest.mark.parametrize("shape", [(0,), (1,), (7,), (3, 64, 5)])
+def test_uniform_numbers_are_those_of_numpy(shape: tuple[int, ...]) -> None:
+    theirs = np.random.default_rng(5).random(shape, dtype=np.float32)
+    ours = standard_uniform(np.random.default_rng(5), shape)
+    assert ours.dtype == np.float32 and np.array_equal(ours, theirs)
