@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import inspect
 import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 
@@ -37,6 +39,20 @@ class _NoAlias(Compiler):
 def jit(function: Callable[..., Any]) -> Any:
     """Compile a kernel: nogil, cached, IEEE arithmetic."""
     return numba.njit(cache=True, nogil=True, error_model="numpy")(inspect.unwrap(function))
+
+
+def jit_with(*modules: ModuleType) -> Callable[[Callable[..., Any]], Any]:
+    """As `jit`, for a kernel that calls helpers of other modules: it is compiled anew when one of these
+    changes, which numba's cache does not notice by itself."""
+    digests = tuple(hashlib.sha256(inspect.getsource(module).encode()).hexdigest() for module in modules)
+
+    def compile(function: Callable[..., Any]) -> Any:
+        compiled = jit(function)
+        index = compiled._cache._cache_file
+        index._source_stamp = (index._source_stamp, *digests)
+        return compiled
+
+    return compile
 
 
 def jit_no_alias(function: Callable[..., Any]) -> Any:

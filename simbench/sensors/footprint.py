@@ -21,14 +21,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64
 
 from scenarios.scenario import LidarSensor
 from simbench.sensors import rays
 from simbench.sensors.compiled import jit
+from simbench.sensors.cones import Cones
 from simbench.sensors.rays import Geoms
 from simbench.sensors.returns import Echoes
 from simbench.sensors.shot import Shot
+from simbench.world import World
 
 FWHM_PER_SD = 2.0 * np.sqrt(2.0 * np.log(2.0))
 BETWEEN_M = 0.2  # how much farther than at start, middle and end of a sweep a geom may be in between
@@ -50,7 +52,6 @@ WEIGHTS = _BELL / _BELL.sum()
 SPECK_M = 1e-9
 RADIUS_SD = 2.0  # of the footprint: that of its outer rays
 DEPTH_RATIO = 1.3  # see _depth_ratio
-DEEPEST_M = 1.0  # and no deeper
 
 
 def beam_sd_rad(sensor: LidarSensor) -> Float64[np.ndarray, "2"]:
@@ -77,25 +78,11 @@ def grown(geoms: Geoms, by_m: Float64[np.ndarray, " n"]) -> Geoms:
     )
 
 
-def edge_beams(shot: Shot, hits: rays.Hits, sd_rad: Float64[np.ndarray, "2"]) -> Bool[np.ndarray, "g k"]:
+def edge_beams(shot: Shot, hits: rays.Hits, sd_rad: Float64[np.ndarray, "2"]) -> Cones:
     """Which beams' footprints may hold more than one surface; none that does is left out."""
-    geoms, widening = shot.world.geoms, float(np.tan(RADIUS_SD * sd_rad.max()))
-    limits = rays.empty_hits(hits.geom.shape)
-    _limits(
-        hits.range_m, hits.geom, hits.cosine, geoms.kind == rays.PLANE, widening * _depth_ratio(geoms),
-        limits.range_m, limits.geom, limits.cosine,
-    )  # fmt: skip
-    limit_m, own = limits.range_m.copy(), limits.geom.copy()
-    shot.cast_onto(limits, grown(geoms, widening * _farthest_m(shot)))
-    edge = limits.geom != own
-    row, column = places((own >= 0) & ~edge)
-    edge[row, column] = ~shot.filled(row, column, own[row, column], widening, limit_m[row, column])
-    return edge
-
-
-def places(where: Bool[np.ndarray, "g k"]) -> tuple[Int64[np.ndarray, " n"], Int64[np.ndarray, " n"]]:
-    """`np.nonzero`, but quick."""
-    return np.divmod(np.flatnonzero(where), where.shape[1])
+    widening = float(np.tan(RADIUS_SD * sd_rad.max()))
+    geoms = shot.world.geoms
+    return shot.edges(hits, grown(geoms, widening * _farthest_m(shot)), widening, _depth_ratio(geoms))
 
 
 def _depth_ratio(geoms: Geoms) -> Float64[np.ndarray, " n"]:
@@ -103,21 +90,6 @@ def _depth_ratio(geoms: Geoms) -> Float64[np.ndarray, " n"]:
     and met head on. An ellipsoid is shrunk in proportion, so most along its longest axis."""
     longest, shortest = geoms.size_m.max(axis=1), np.maximum(geoms.size_m.min(axis=1), 1e-9)
     return DEPTH_RATIO * np.where(geoms.kind == rays.ELLIPSOID, longest / shortest, 1.0)
-
-
-@jit
-def _limits(range_m, geom, cosine, ground, depth, out_range, out_geom, out_cosine):  # type: ignore[no-untyped-def]
-    """How far along each ray another surface matters: to where its own surface fills the cone about it. The
-    ground and the sky have no limit, and count as no geom."""
-    for g in range(geom.shape[0]):
-        for k in range(geom.shape[1]):
-            i = geom[g, k]
-            out_cosine[g, k] = 0.0
-            if i < 0 or ground[i]:
-                out_range[g, k], out_geom[g, k] = np.inf, -1
-                continue
-            deep = depth[i] * range_m[g, k] / max(float(cosine[g, k]), 1e-3)
-            out_range[g, k], out_geom[g, k] = range_m[g, k] + min(deep, DEEPEST_M), i
 
 
 def _farthest_m(shot: Shot) -> Float64[np.ndarray, " n"]:
@@ -130,21 +102,16 @@ def _farthest_m(shot: Shot) -> Float64[np.ndarray, " n"]:
     return np.where(geoms.kind == rays.PLANE, 0.0, far_m + np.minimum(geoms.bound_m, 1e6) + BETWEEN_M)
 
 
-def mixed(
-    sensor: LidarSensor,
-    shot: Shot,
-    edge: Bool[np.ndarray, "g k"],
-    echoes: Echoes,
-) -> Echoes:
-    """`echoes` with those of the edge beams replaced, in place, by what their whole footprints return."""
-    world = shot.world
-    row, column = places(edge)
-    hits = shot.cast_beside(SAMPLES * beam_sd_rad(sensor), row, column)
+def mixed(sensor: LidarSensor, world: World, edges: Cones, hits: rays.Hits, echoes: Echoes) -> Echoes:
+    """`echoes` with those of the edge beams replaced, in place, by what their whole footprints return.
+
+    hits [n s]: of the rays `SAMPLES` of the edge beams.
+    """
     # Only the true range has to be parted from the range; nobody else holds these arrays.
     result = replace(echoes, true_range_m=echoes.true_range_m.copy())
     _mix(
         hits.range_m, hits.geom, hits.cosine, WEIGHTS, world.reflectivity, world.roughness_gain,
-        sensor.merge_m, row, column,
+        sensor.merge_m, edges.fan, edges.step,
         result.range_m, result.true_range_m, result.geom, result.cosine, result.reflectivity,
     )  # fmt: skip
     return result
@@ -158,6 +125,8 @@ def _mix(  # type: ignore[no-untyped-def]
     """Footprint n, samples s -> the strongest return, written to (row[n], column[n]) of the outputs."""
     samples = weight.shape[0]
     order, back, power = np.empty(samples, np.int64), np.empty(samples), np.empty(samples)
+    near = np.empty(samples)  # in order of distance, as `order` is
+    name, total_of, main_of = np.empty(samples, np.int64), np.empty(samples), np.empty(samples, np.int64)
     for n in range(row.shape[0]):
         alone = True
         for s in range(1, samples):
@@ -171,21 +140,21 @@ def _mix(  # type: ignore[no-untyped-def]
             g = geom[n, s]
             if g < 0:
                 continue
-            x = float(cosine[n, s])
+            x, far = float(cosine[n, s]), distance[n, s]
             back[s] = weight[s] * reflectivity[g] * (x + gain[g] * (1.0 - x * x))
-            power[s] = back[s] / (distance[n, s] * distance[n, s])
+            power[s] = back[s] / (far * far)
             place = hit
-            while place > 0 and distance[n, order[place - 1]] > distance[n, s]:
-                order[place] = order[place - 1]
+            while place > 0 and near[place - 1] > far:
+                near[place], order[place] = near[place - 1], order[place - 1]
                 place -= 1
-            order[place] = s
+            near[place], order[place] = far, s
             hit += 1
         # Along the range, a gap of `merge` ends a return. The nearest of equally strong ones wins.
         best, best_first, best_end, first = -1.0, 0, 0, 0
         total = 0.0
         for i in range(hit):
             total += power[order[i]]
-            if i + 1 == hit or distance[n, order[i + 1]] - distance[n, order[i]] >= merge:
+            if i + 1 == hit or near[i + 1] - near[i] >= merge:
                 if total > best:
                     best, best_first, best_end = total, first, i + 1
                 first, total = i + 1, 0.0
@@ -193,26 +162,25 @@ def _mix(  # type: ignore[no-untyped-def]
         if best <= 0.0:  # what is hit sends nothing back
             out_geom[r, c] = -1
             continue
-        mean, sent, most, main = 0.0, 0.0, -1.0, -1
+        mean, sent, geoms = 0.0, 0.0, 0
         for i in range(best_first, best_end):
             s = order[i]
-            mean += power[s] * distance[n, s]
+            mean += power[s] * near[i]
             sent += back[s]
-            known = False
-            for k in range(best_first, i):
-                known = known or geom[n, order[k]] == geom[n, s]
-            if known:
-                continue
-            of_geom, brightest = 0.0, s
-            for k in range(i, best_end):
-                q = order[k]
-                if geom[n, q] == geom[n, s]:
-                    of_geom += power[q]
-                    brightest = q if power[q] > power[brightest] else brightest
-            if of_geom > most:
-                most, main = of_geom, brightest
+            k = 0
+            while k < geoms and name[k] != geom[n, s]:
+                k += 1
+            if k == geoms:
+                name[k], total_of[k], main_of[k] = geom[n, s], 0.0, s
+                geoms += 1
+            total_of[k] += power[s]
+            main_of[k] = s if power[s] > power[main_of[k]] else main_of[k]
+        main = 0
+        for k in range(1, geoms):
+            main = k if total_of[k] > total_of[main] else main
+        s = main_of[main]
         out_range[r, c] = mean / best
-        out_true[r, c] = distance[n, main]
-        out_geom[r, c] = geom[n, main]
-        out_cosine[r, c] = cosine[n, main]
+        out_true[r, c] = distance[n, s]
+        out_geom[r, c] = geom[n, s]
+        out_cosine[r, c] = cosine[n, s]
         out_reflectivity[r, c] = sent

@@ -116,5 +116,7 @@ def _echoes(sensor: LidarSensor, shot: Shot) -> Echoes:
     echoes = returns.pure(hits, shot.world.reflectivity, shot.world.roughness_gain)
     if "divergence" in sensor.off or max(sensor.divergence_deg) == 0.0:
         return echoes
-    edge = footprint.edge_beams(shot, hits, footprint.beam_sd_rad(sensor))
-    return footprint.mixed(sensor, shot, edge, echoes)
+    sd_rad = footprint.beam_sd_rad(sensor)
+    edges = footprint.edge_beams(shot, hits, sd_rad)
+    beside = shot.cast_beside(edges, footprint.SAMPLES * sd_rad)
+    return footprint.mixed(sensor, shot.world, edges, beside, echoes)

@@ -864,97 +864,47 @@ def _nothing(out_at, begin, end, stride, out_range, out_geom, out_cosine):  # ty
 
 
 @jit_inline
-def _start_from(  # type: ignore[no-untyped-def]
-    out_at, begin, end, stride, out_range, out_geom, out_cosine, slope, skew, best, who, facing,
+def _reached(  # type: ignore[no-untyped-def]
+    kind, size, M, X, stretch, skew, slack, narrowest, widest, low, bins_per_slope, first_step, last_step,
+    begin, end, extent, lowest, highest,
 ):  # fmt: skip
-    """From hits in metres to lengths along e + s u + x n: the inverse of `_finish`."""
-    for lane in range(LANES):
-        if out_at[lane] != NOWHERE:
-            for j in range(begin, end):
-                at = out_at[lane] + j * stride
-                norm = np.sqrt(1.0 + slope[j, lane] * slope[j, lane] + skew[j, lane] * skew[j, lane])
-                best[j, lane], who[j, lane] = out_range[at] / norm, out_geom[at]
-                facing[j, lane] = out_cosine[at] * norm
+    """From which step of four fans to which a geom may be met, its axes and centre in theirs given.
 
-
-@jit_inline
-def _copy(start, stop, best, who, facing, to_best, to_who, to_facing):  # type: ignore[no-untyped-def]
-    for j in range(start, stop):
-        for lane in range(LANES):
-            to_best[j, lane], to_who[j, lane] = best[j, lane], who[j, lane]
-            to_facing[j, lane] = facing[j, lane]
-
-
-@jit_inline
-def _put_back(own, i, start, stop, kept_best, kept_who, kept_facing, best, who, facing):  # type: ignore[no-untyped-def]
-    """A ray's own geom does not replace what it has."""
-    for j in range(start, stop):
-        for lane in range(LANES):
-            if own[j, lane] == i:
-                best[j, lane], who[j, lane] = kept_best[j, lane], kept_who[j, lane]
-                facing[j, lane] = kept_facing[j, lane]
-
-
-@jit
-def _filled(  # type: ignore[no-untyped-def]
-    kind, size, row, still, table, key, weight, R, origin, pose_of, frame, slope, skew, scale, fan, step,
-    geom, widening, limit, out,
-):  # fmt: skip
-    """Whether geom[n], made smaller on all sides by the radius of the cone about ray step[n] of fan[n]
-    (`widening` times the distance), is still met by that ray, not beyond limit[n]."""
-    o, d, at, small, work = np.empty(3), np.empty(3), np.empty(12), np.empty(3), np.empty(3)
-    D = np.empty(3)
-    for n in range(fan.shape[0]):
-        f, i = fan[n], geom[n]
-        p = pose_of[f]
-        by = widening * limit[n]
-        out[n] = False
-        least = size[i, 0]
-        if kind[i] == CYLINDER:
-            least = min(least, size[i, 1])
-        elif kind[i] == BOX or kind[i] == ELLIPSOID:
-            least = min(least, size[i, 1], size[i, 2])
-        if kind[i] == PLANE or least <= by * (1.0 + 1e-9) + 1e-9:
-            continue
-        for r in range(3):
-            small[r] = size[i, r] * (1.0 - by / least) if kind[i] == ELLIPSOID else size[i, r] - by
-        if kind[i] == CAPSULE:
-            small[1] = size[i, 1]
-        if row[i] < 0:
-            for r in range(12):
-                at[r] = still[i, r]
-        else:
-            k, w = key[p], weight[p]
-            last = min(k + 1, table.shape[0] - 1)
-            for r in range(12):
-                at[r] = table[k, row[i], r] + w * (table[last, row[i], r] - table[k, row[i], r])
-        group, lane = 0 if slope.shape[0] == 1 else f // LANES, f % LANES
-        s, x = scale[f] * slope[group, step[n], lane], skew[group, step[n], lane]
-        norm = np.sqrt(1.0 + s * s + x * x)
-        for r in range(3):
-            work[r] = (frame[f, r, 0] + s * frame[f, r, 1] + x * frame[f, r, 2]) / norm
-        for r in range(3):
-            D[r] = R[p, r, 0] * work[0] + R[p, r, 1] * work[1] + R[p, r, 2] * work[2]
-        for r in range(3):
-            o[r], d[r] = 0.0, 0.0
-            for c in range(3):
-                o[r] += at[3 * c + r] * (origin[p, c] - at[9 + c])
-                d[r] += at[3 * c + r] * D[c]
-        out[n] = _hit(kind[i], small, o, d, work) <= limit[n]
+    extent [3 4], lowest, highest [4]: scratch.
+    """
+    if kind == BOX:
+        _extent_of_box(size, M, extent)
+    elif kind == ELLIPSOID:
+        _extent_of_ellipsoid(size, M, extent)
+    elif kind == SPHERE:
+        extent[:] = size[0]
+    else:
+        _extent_of_tube(size, 1.0 if kind == CAPSULE else 0.0, M, extent)
+    _slopes_of(X, extent, stretch, skew, lowest, highest)
+    bottom = min(lowest[0], lowest[1], lowest[2], lowest[3]) - slack
+    top = max(highest[0], highest[1], highest[2], highest[3]) + slack
+    if bottom > top:
+        return begin, begin
+    bottom, top = min(bottom / narrowest, bottom / widest), max(top / narrowest, top / widest)
+    bins = first_step.shape[0]
+    b0 = (bottom - low) * bins_per_slope
+    b1 = (top - low) * bins_per_slope + 1.0
+    if b0 > bins - 1 or b1 < 0.0:
+        return begin, begin
+    return max(first_step[int(max(b0, 0.0))], begin), min(last_step[int(min(b1, bins - 1.0))], end)
 
 
 @jit
 def _cast_fans(  # type: ignore[no-untyped-def]
     kind, size, bound, row, still, table, path, key, weight, R, origin, pose_of, frame, slope, skew,
     scale, first_step, last_step, low, bins_per_slope, slack, skew_max, out_at, out_stride, start, stop,
-    begin, end, onto, out_range, out_geom, out_cosine,
+    begin, end, out_range, out_geom, out_cosine,
 ):  # fmt: skip
     """Rays [begin, end) of the fans [start, stop), four fans at a time; start and stop are multiples of four.
 
     out_* are flat: ray j of fan f goes to out_at[f] + j * out_stride, that of padding (NOWHERE) is left out.
-    With `onto` they hold hits already, and a ray keeps its own unless another geom than that is nearer.
     """
-    geoms, bins = kind.shape[0], first_step.shape[1]
+    geoms = kind.shape[0]
     alike = slope.shape[0] == 1  # all fans have the same slopes but for their scale
     least, most = np.inf, -np.inf
     for f in range(start, stop):
@@ -980,10 +930,7 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     R[p, r, 0] * frame[f, 0, c] + R[p, r, 1] * frame[f, 1, c] + R[p, r, 2] * frame[f, 2, c]
                 )
     best, facing = np.empty((end, LANES)), np.empty((end, LANES))
-    who, own = np.empty((end, LANES), np.int32), np.empty((end, LANES), np.int32)
-    kept = end if onto else 0
-    kept_best, kept_facing = np.empty((kept, LANES)), np.empty((kept, LANES))
-    kept_who = np.empty((kept, LANES), np.int32)
+    who = np.empty((end, LANES), np.int32)
     G, C, M, o, X = (
         np.empty((9, LANES)), np.empty((3, LANES)), np.empty((9, LANES)), np.empty((3, LANES)),
         np.empty((3, LANES)),
@@ -1010,10 +957,9 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                     pose_of, W, least - slack, most + slack, skew_max + slack, close, some, plane, here,
                 )  # fmt: skip
                 if few + flat == 0:
-                    if not onto:
-                        _nothing(
-                            out_at[fan : fan + LANES], begin, end, out_stride, out_range, out_geom, out_cosine
-                        )
+                    _nothing(
+                        out_at[fan : fan + LANES], begin, end, out_stride, out_range, out_geom, out_cosine
+                    )
                     continue
                 table_of = 0 if alike else group
                 narrowest = min(scale[fan], scale[fan + 1], scale[fan + 2], scale[fan + 3])
@@ -1029,17 +975,6 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                 for j in range(begin, end):
                     for lane in range(LANES):
                         best[j, lane], who[j, lane], facing[j, lane] = np.inf, -1, 0.0
-                own0, own1 = end, begin  # between which steps there are hits already
-                if onto:
-                    _start_from(
-                        out_at[fan : fan + LANES], begin, end, out_stride, out_range, out_geom, out_cosine,
-                        s, x, best, who, facing,
-                    )  # fmt: skip
-                    for j in range(begin, end):
-                        for lane in range(LANES):
-                            own[j, lane] = who[j, lane]
-                            if who[j, lane] >= 0:
-                                own0, own1 = min(own0, j), j + 1
                 for m in range(flat):
                     i = planes[m]
                     if row[i] < 0:
@@ -1048,10 +983,7 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         _frames_of(row[i], table, key4, weight4, G, C)
                         _lanes(G, C, P4, W4, M, o, X)
                     j0, j1 = _steps_down(M, s, skew_max + slack, begin, end)
-                    k0, k1 = max(j0, own0), min(j1, own1)
-                    _copy(k0, k1, best, who, facing, kept_best, kept_who, kept_facing)
                     _fans_plane(size[i], M, o, s, x, j0, j1, i, best, who, facing)
-                    _put_back(own, i, k0, k1, kept_best, kept_who, kept_facing, best, who, facing)
                 for m in range(few):
                     i = here[m]
                     if row[i] < 0:
@@ -1060,28 +992,13 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                         _frames_of(row[i], table, key4, weight4, G, C)
                         _lanes(G, C, P4, W4, M, o, X)
                     stretch = 1.0 if row[i] < 0 else 1.01  # a frame between two keys is not quite rigid
-                    if kind[i] == BOX:
-                        _extent_of_box(size[i], M, extent)
-                    elif kind[i] == ELLIPSOID:
-                        _extent_of_ellipsoid(size[i], M, extent)
-                    elif kind[i] == SPHERE:
-                        extent[:] = size[i, 0]
-                    else:
-                        _extent_of_tube(size[i], 1.0 if kind[i] == CAPSULE else 0.0, M, extent)
-                    _slopes_of(X, extent, stretch, skew_max + slack, lowest, highest)
-                    bottom = min(lowest[0], lowest[1], lowest[2], lowest[3]) - slack
-                    top = max(highest[0], highest[1], highest[2], highest[3]) + slack
-                    if bottom > top:
+                    j0, j1 = _reached(
+                        kind[i], size[i], M, X, stretch, skew_max + slack, slack, narrowest, widest, low,
+                        bins_per_slope, first_step[table_of], last_step[table_of], begin, end, extent, lowest,
+                        highest,
+                    )  # fmt: skip
+                    if j0 >= j1:
                         continue
-                    bottom, top = min(bottom / narrowest, bottom / widest), max(top / narrowest, top / widest)
-                    b0 = (bottom - low) * bins_per_slope
-                    b1 = (top - low) * bins_per_slope + 1.0
-                    if b0 > bins - 1 or b1 < 0.0:
-                        continue
-                    j0 = max(first_step[table_of, int(max(b0, 0.0))], begin)
-                    j1 = min(last_step[table_of, int(min(b1, bins - 1.0))], end)
-                    k0, k1 = max(j0, own0), min(j1, own1)
-                    _copy(k0, k1, best, who, facing, kept_best, kept_who, kept_facing)
                     for lane in range(LANES):
                         x0, y0, z0 = o[0, lane], o[1, lane], o[2, lane]
                         if x0 * x0 + y0 * y0 + z0 * z0 > 1.01 * bound[i] * bound[i] + 1e-6:
@@ -1091,7 +1008,6 @@ def _cast_fans(  # type: ignore[no-untyped-def]
                                 kind[i], size[i], M, o, s, x, lane, begin, end, i, best, who, facing, work
                             )
                     _fans_solid(kind[i], size[i], M, o, s, x, j0, j1, i, best, who, facing)
-                    _put_back(own, i, k0, k1, kept_best, kept_who, kept_facing, best, who, facing)
                 _finish(s, x, begin, end, best, facing)
                 for lane in range(LANES):
                     at = out_at[fan + lane]

@@ -245,12 +245,8 @@ def cast_fans(
     out: Hits,
     slope: Float64[np.ndarray, "g k l"] | None = None,
     skew: Float64[np.ndarray, "g k l"] | None = None,
-    onto: bool = False,
 ) -> None:
     """Nearest hit of every ray of the fans, into `out` (its arrays seen as flat).
-
-    `onto`: `out` holds hits already (geom -1: a limit of the range), and a ray keeps its own unless another
-    geom than that is nearer.
 
     Pose i of the sensor is R_world_sensor[i], origin_m[i], at the instant between keys key[i] and key[i] + 1
     of `placed`, `weight[i]` of the way. `slope`, `skew`: packed as the fans', within their slack of them.
@@ -285,7 +281,6 @@ def cast_fans(
         len(fans.pose),
         0,
         fans.slope.shape[1],
-        onto,
         out.range_m.reshape(-1),
         out.geom.reshape(-1),
         out.cosine.reshape(-1),
@@ -318,7 +313,7 @@ def cast_window(
         placed.still[wanted], placed.keys, placed.path_m, key, weight,
         np.ascontiguousarray(R_world_sensor), np.ascontiguousarray(origin_m), pose, fans.frame, fans.slope,
         fans.skew, fans.scale, fans.first_step, fans.last_step, fans.low, fans.bins_per_slope, fans.slack,
-        fans.skew_max, out_at, 1, start, stop, begin, end, False,
+        fans.skew_max, out_at, 1, start, stop, begin, end,
         hits.range_m.reshape(-1), hits.geom.reshape(-1), hits.cosine.reshape(-1),
     )  # fmt: skip
     named = np.append(wanted, -1).astype(np.int32)[hits.geom]
@@ -345,33 +340,6 @@ def hiders(
         np.array(slopes), out,
     )  # fmt: skip
     return out[:count]
-
-
-def filled(
-    placed: Placed,
-    key: Int64[np.ndarray, " p"],
-    weight: Float64[np.ndarray, " p"],
-    R_world_sensor: Float64[np.ndarray, "p 3 3"],
-    origin_m: Float64[np.ndarray, "p 3"],
-    fans: Fans,
-    fan: Int64[np.ndarray, " n"],
-    step: Int64[np.ndarray, " n"],
-    geom: Int32[np.ndarray, " n"],
-    widening: float,
-    limit_m: Float64[np.ndarray, " n"],
-) -> Bool[np.ndarray, " n"]:
-    """Whether a geom surely fills the cone about one ray of the fans: all of the cone, whose radius is
-    `widening` times the distance, is inside it somewhere nearer than limit_m.
-
-    The rest is as for `cast_fans`. Never True wrongly; maybe False for a geom that just fills the cone.
-    """
-    found = np.empty(len(fan), dtype=np.bool_)
-    kernel._filled(
-        placed.geoms.kind, placed.geoms.size_m, placed.row, placed.still, placed.keys, key, weight,
-        R_world_sensor, origin_m, fans.pose, fans.frame, fans.slope, fans.skew, fans.scale, fan, step, geom,
-        widening, limit_m, found,
-    )  # fmt: skip
-    return found
 
 
 def empty_hits(shape: tuple[int, ...]) -> Hits:

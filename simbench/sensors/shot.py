@@ -6,18 +6,17 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from jaxtyping import Bool, Float32, Float64, Int32, Int64
+from jaxtyping import Float32, Float64, Int64
 
 from fusion.geometry import readonly
 from simbench.motion import Motion
-from simbench.sensors import rays
+from simbench.sensors import cones, rays
 from simbench.sensors.beams import BeamTable
 from simbench.sensors.compiled import jit
-from simbench.sensors.ray_kernel import LANES
+from simbench.sensors.cones import Cones
 from simbench.world import World
 
 COLUMNS_PER_KEY = 32
-NEAR_GROUPS = 16  # beams of so many neighbouring groups are cast side by side
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,65 +46,21 @@ class Shot:
         rays.cast_fans(self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, hits)
         return hits
 
-    def cast_onto(self, hits: rays.Hits, geoms: rays.Geoms) -> None:
-        """Among other shapes at the same places: what replaces `hits` goes there; see `rays.cast_fans`."""
-        rays.cast_fans(
-            replace(self.placed, geoms=geoms), self.key, self.weight, self.rotation, self.origin_m, self.fans,
-            hits, onto=True,
+    def edges(
+        self, hits: rays.Hits, grown: rays.Geoms, widening: float, depth: Float64[np.ndarray, " n"]
+    ) -> Cones:
+        """The beams whose cones may hold more than one surface; see `cones.edges`."""
+        return cones.edges(
+            self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, hits, grown,
+            widening, depth,
         )  # fmt: skip
 
-    def filled(
-        self,
-        group: Int64[np.ndarray, " n"],
-        place: Int64[np.ndarray, " n"],
-        geom: Int32[np.ndarray, " n"],
-        widening: float,
-        limit_m: Float64[np.ndarray, " n"],
-    ) -> Bool[np.ndarray, " n"]:
-        """Which of some middle rays' cones one geom fills nearer than a limit; see `rays.filled`."""
-        return rays.filled(
-            self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, group, place, geom,
-            widening, limit_m,
-        )  # fmt: skip
-
-    def cast_beside(
-        self,
-        offset_rad: Float64[np.ndarray, "s 2"],
-        group: Int64[np.ndarray, " n"],
-        place: Int64[np.ndarray, " n"],
-    ) -> rays.Hits:
+    def cast_beside(self, edges: Cones, offset_rad: Float64[np.ndarray, "s 2"]) -> rays.Hits:
         """Nearest hits [n s] of rays that look aside some beams' middle ones by angles (across to the left,
-        up; up ascending), at the beams' own instants."""
-        samples = len(offset_rad)
-        hits = rays.empty_hits((len(group), samples))
-        if not len(group):
-            return hits
-        order = np.lexsort((place, group // NEAR_GROUPS))  # fans side by side look the same way
-        order = np.append(order, np.repeat(order[-1:], -len(order) % LANES))
-        frame = np.empty((len(order), 3, 3))
-        _beam_frames(self.fans.slope, self.fans.skew, self.fans.frame, group[order], place[order], frame)
-        one = rays.make_fans(
-            frame=np.eye(3)[None],
-            slope=np.tan(offset_rad[None, :, 1]),
-            skew=np.tan(offset_rad[None, :, 0]),
-            pose=np.zeros(1, dtype=np.int64),
-            out_at=np.zeros(1, dtype=np.int64),
-            out_stride=1,
+        up), at the beams' own instants."""
+        return cones.cast_cones(
+            self.placed, self.key, self.weight, self.rotation, self.origin_m, self.fans, edges, offset_rad
         )
-        blocks = len(order) // LANES
-        fans = replace(
-            one,
-            frame=frame,
-            slope=np.repeat(one.slope, blocks, axis=0),
-            skew=np.repeat(one.skew, blocks, axis=0),
-            scale=np.ones(len(order)),
-            pose=group[order],
-            out_at=order * samples,
-            first_step=np.repeat(one.first_step, blocks, axis=0),
-            last_step=np.repeat(one.last_step, blocks, axis=0),
-        )
-        rays.cast_fans(self.placed, self.key, self.weight, self.rotation, self.origin_m, fans, hits)
-        return hits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -208,20 +163,3 @@ def _disturb(base, along_azimuth, along_elevation, slots, azimuth_error, elevati
             most = max(most, change)
             slope[block, k, lane], skew[block, k, lane] = new_slope, new_skew
     return most
-
-
-@jit
-def _beam_frames(slope, skew, frame, group, place, out):  # type: ignore[no-untyped-def]
-    """Frames of some beams in the sensor's frame: columns along the beam, up, and level to the left."""
-    lanes = slope.shape[2]
-    d = np.empty(3)
-    for n in range(group.shape[0]):
-        g = group[n]
-        u, v = slope[g // lanes, place[n], g % lanes], skew[g // lanes, place[n], g % lanes]
-        norm = np.sqrt(1.0 + u * u + v * v)
-        for i in range(3):
-            d[i] = (frame[g, i, 0] + u * frame[g, i, 1] + v * frame[g, i, 2]) / norm
-            out[n, i, 0] = d[i]
-        level = np.sqrt(d[0] * d[0] + d[1] * d[1])
-        out[n, 0, 1], out[n, 1, 1], out[n, 2, 1] = -d[2] * d[0] / level, -d[2] * d[1] / level, level
-        out[n, 0, 2], out[n, 1, 2], out[n, 2, 2] = -d[1] / level, d[0] / level, 0.0

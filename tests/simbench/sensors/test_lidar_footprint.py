@@ -14,7 +14,8 @@ from fusion.geometry import Transform, rotation_rpy
 from scenarios.load import load_sensor
 from scenarios.scenario import LidarSensor
 from simbench.motion import Motion
-from simbench.sensors import footprint, lidar, rays, returns
+from simbench.sensors import cones, footprint, lidar, rays, returns
+from simbench.sensors.cones import Cones
 from simbench.sensors.shot import Shot, aim
 from tests.simbench.scenes import (
     Shape,
@@ -56,16 +57,52 @@ def shot_of(motion: Motion, sensor: LidarSensor, start_ns: int = 0) -> Shot:
     return aim("lidar", motion, table, start_ns, zero, zero, 0.0)
 
 
-def echoes_of(
-    motion: Motion, sensor: LidarSensor, everywhere: bool = False
-) -> tuple[returns.Echoes, np.ndarray]:
+def echoes_of(motion: Motion, sensor: LidarSensor) -> tuple[returns.Echoes, np.ndarray]:
+    """What the sensor's beams return, and which of them [g k] were looked at closely."""
     shot = shot_of(motion, sensor)
     hits = shot.cast()
     echoes = returns.pure(hits, shot.world.reflectivity, shot.world.roughness_gain)
-    edge = footprint.edge_beams(shot, hits, footprint.beam_sd_rad(sensor))
-    if everywhere:
-        edge = np.ones_like(edge)
-    return footprint.mixed(sensor, shot, edge, echoes), edge
+    sd_rad = footprint.beam_sd_rad(sensor)
+    edges = footprint.edge_beams(shot, hits, sd_rad)
+    within = shot.cast_beside(edges, footprint.SAMPLES * sd_rad)
+    edge = np.zeros(hits.geom.shape, dtype=np.bool_)
+    edge[edges.fan, edges.step] = True
+    return footprint.mixed(sensor, shot.world, edges, within, echoes), edge
+
+
+def brute_echoes_of(motion: Motion, sensor: LidarSensor) -> returns.Echoes:
+    """The same with all rays of all beams cast at all geoms."""
+    shot = shot_of(motion, sensor)
+    hits = shot.cast()
+    echoes = returns.pure(hits, shot.world.reflectivity, shot.world.roughness_gain)
+    every = all_cones(shot)
+    within = cast_as_fans(shot, every, footprint.SAMPLES * footprint.beam_sd_rad(sensor))
+    return footprint.mixed(sensor, shot.world, every, within, echoes)
+
+
+def all_cones(shot: Shot) -> Cones:
+    """The cones of all beams; which geoms they may meet is left open."""
+    fan, step = np.divmod(np.arange(len(shot.instant_ns) * shot.width), shot.width)
+    return Cones(fan=fan, step=step, first=np.zeros(len(fan) + 1, np.int64), member=np.empty(0, np.int32))
+
+
+def cast_as_fans(shot: Shot, at: Cones, offset_rad: np.ndarray) -> rays.Hits:
+    """The rays of some cones as short fans of `rays.cast_fans`, which looks for what they meet by itself."""
+    lanes = shot.fans.slope.shape[2]
+    packed = (at.fan // lanes, at.step, at.fan % lanes)
+    ray = np.stack([np.ones(len(at.fan)), shot.fans.slope[packed], shot.fans.skew[packed]], axis=1)
+    along = np.einsum("nij,nj->ni", shot.fans.frame[at.fan], ray)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    left = np.cross([0.0, 0.0, 1.0], along)
+    left /= np.linalg.norm(left, axis=1, keepdims=True)
+    frame = np.stack([along, np.cross(along, left), left], axis=2)
+    hits = rays.empty_hits((len(at.fan), len(offset_rad)))
+    fans = rays.make_fans(
+        frame, *(np.tile(np.tan(angle), (len(frame), 1)) for angle in offset_rad[:, ::-1].T), at.fan,
+        np.arange(len(frame)) * len(offset_rad), 1,
+    )  # fmt: skip
+    rays.cast_fans(shot.placed, shot.key, shot.weight, shot.rotation, shot.origin_m, fans, hits)
+    return hits
 
 
 @pytest.fixture(scope="module")
@@ -106,7 +143,7 @@ def test_every_footprint_over_an_edge_is_found_and_not_too_many_others_are_looke
     motion = shaken_motion(staged("overtake-approach", system, 3))  # type: ignore[arg-type]
     sensor = os1()
     found, edge = echoes_of(motion, sensor)
-    brute, _ = echoes_of(motion, sensor, everywhere=True)
+    brute = brute_echoes_of(motion, sensor)
     plain = shot_of(motion, sensor).cast()
     straddles = (brute.geom != plain.geom) | (brute.range_m != plain.range_m)
     straddles &= (
@@ -146,7 +183,7 @@ def test_edges_of_all_shapes_are_found_however_thin_they_are(kinds: list[int], s
     motion = toy_motion(toy_world(shapes, [STILL]), ABOVE)
     sensor = ideal_lidar(divergence_deg=(0.3, 0.3), merge_m=0.6)
     _, edge = echoes_of(motion, sensor)
-    brute, _ = echoes_of(motion, sensor, everywhere=True)
+    brute = brute_echoes_of(motion, sensor)
     plain = shot_of(motion, sensor).cast()
     straddles = (brute.geom != plain.geom) | (brute.range_m != plain.range_m)
     assert edge[straddles].all()
@@ -165,6 +202,51 @@ def test_a_wire_between_the_beams_is_seen_by_the_beams_beside_it() -> None:
     assert np.flatnonzero(echoes.geom[:, 0] == 0).tolist() == [10]
     share = echoes.reflectivity[10, 0] / (0.8 * echoes.cosine[10, 0])
     assert 0.01 < share < 0.5
+
+
+@settings(max_examples=25)
+@given(seed=st.integers(0, 2**32 - 1), inside=st.booleans())
+def test_the_rays_of_an_edge_beam_meet_what_they_meet_among_all_geoms(seed: int, inside: bool) -> None:
+    """Crowds of moving shapes, so that many stand behind one another and a set needs several words; on
+    wish the sensor is inside one of them."""
+    rng = np.random.default_rng(seed)
+    kinds = rng.choice([rays.SPHERE, rays.CAPSULE, rays.ELLIPSOID, rays.CYLINDER, rays.BOX], 150)
+    angle = rng.uniform(-0.5, 0.5, len(kinds))
+    shapes = [
+        Shape(
+            kind=int(kind),
+            size_m=tuple(np.exp(rng.uniform(np.log(0.01), np.log(0.6), 3)).tolist()),  # type: ignore[arg-type]
+            xyz_m=(far * np.cos(a), far * np.sin(a), float(rng.uniform(0.5, 3.0))),
+            rotation=rotation_rpy(*rng.uniform(-3.0, 3.0, 3)),
+            mover=int(rng.integers(0, 2)),
+        )
+        for kind, a, far in zip(kinds, angle, rng.uniform(3.0, 30.0, len(kinds)), strict=True)
+    ]
+    shapes.append(Shape(kind=rays.PLANE, size_m=(0.0, 0.0, 1.0)))
+    if inside:
+        shapes.append(Shape(kind=rays.BOX, size_m=(6.0, 9.0, 4.0), xyz_m=(1.0, 0.0, 0.0)))
+    tracks = [straight((0.0, 0.0), 0.0, 3.0), straight((0.0, 1.0), 60.0, 4.0)]
+    motion = toy_motion(toy_world(shapes, tracks), ABOVE)
+    sensor = ideal_lidar(divergence_deg=(0.3, 0.2), merge_m=0.6)
+    shot, sd_rad = shot_of(motion, sensor), footprint.beam_sd_rad(sensor)
+    edges = footprint.edge_beams(shot, shot.cast(), sd_rad)
+    assert len(edges.fan) > 10
+    assert len(edges.member) < 0.2 * len(shapes) * len(edges.fan)
+    few = shot.cast_beside(edges, footprint.SAMPLES * sd_rad)
+    all_ = cast_as_fans(shot, edges, footprint.SAMPLES * sd_rad)
+    assert np.array_equal(few.geom, all_.geom)
+    np.testing.assert_allclose(few.range_m, all_.range_m, rtol=1e-12)
+    np.testing.assert_allclose(few.cosine, all_.cosine, rtol=1e-5, atol=1e-6)
+
+
+def test_room_for_what_cones_may_meet_grows_as_needed(monkeypatch: pytest.MonkeyPatch, scene: Stage) -> None:
+    shot = shot_of(scripted_motion(scene), os1(columns=64))
+    hits, sd_rad = shot.cast(), footprint.beam_sd_rad(os1())
+    plenty = footprint.edge_beams(shot, hits, sd_rad)
+    monkeypatch.setattr(cones, "ROOM_PER_RAY", 1)
+    little = footprint.edge_beams(shot, hits, sd_rad)
+    for name in ("fan", "step", "first", "member"):
+        assert np.array_equal(getattr(plenty, name), getattr(little, name))
 
 
 # -- what they return -------------------------------------------------------------------------------------
