@@ -18,7 +18,7 @@ from simbench.motion import Motion
 from simbench.sensors import rays
 from simbench.sensors.compiled import jit
 from simbench.sensors.develop import develop
-from simbench.sensors.lens import pixel_directions, row_fans
+from simbench.sensors.lens import direction_planes, row_fans
 from simbench.sensors.rows import Exposure, exposure_at, row_times_ns
 from simbench.sensors.shade import Palette, shade, toward_sun
 from simbench.world import GROUND
@@ -47,7 +47,7 @@ def light_in(
     camera: PinholeCamera, exposure: Exposure, palette: Palette, seen: rays.Hits
 ) -> Float32[np.ndarray, "h w 3"]:
     """Linear light of all pixels."""
-    direction = pixel_directions(camera)
+    direction = direction_planes(camera)
     lit = rays.sunlit(
         exposure.placed, exposure.key, exposure.weight, exposure.R_world_camera, exposure.origin_m,
         row_fans(camera), seen, toward_sun(),
@@ -84,14 +84,16 @@ def take(
             total += light_in(camera, sooner, palette, look(camera, sooner))
         linear = (total / samples).astype(np.float32)
     object_id, depth_m = np.empty(seen.geom.shape, np.int32), np.empty(seen.geom.shape, np.float32)
-    _truth(world.geom_object, seen.range_m, seen.geom, pixel_directions(camera), GROUND, object_id, depth_m)
+    _truth(world.geom_object, seen.range_m, seen.geom, direction_planes(camera), GROUND, object_id, depth_m)
     return Frame(rgb=develop(linear, sensor, rng), object_id=object_id, depth_m=depth_m)
 
 
 @jit
 def _truth(owner, range_m, geom, direction, ground, object_id, depth_m):  # type: ignore[no-untyped-def]
     for row in range(geom.shape[0]):
+        ahead = direction[row, 2]
         for col in range(geom.shape[1]):
             g = geom[row, col]
             object_id[row, col] = owner[g] if g >= 0 else ground
-            depth_m[row, col] = range_m[row, col] * direction[row, col, 2]
+        for col in range(geom.shape[1]):
+            depth_m[row, col] = range_m[row, col] * ahead[col]

@@ -100,19 +100,32 @@ def _expose(linear, luma, exposure, shot, read2, drawn, normals, display, out): 
     """shot: variance of the shot noise of white; read2: of the read noise; both relative to white."""
     noisy, top, sixth = drawn.shape[0] > 0, np.float32(display.shape[0] - 1), np.float32(1.0 / 6.0)
     none, one, half, tiny = np.float32(0.0), np.float32(1.0), np.float32(0.5), np.float32(1e-20)
+    channels = out.shape[2]
+    width = out.shape[1] * channels
+    value, z, code = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.int32)
     for row in range(out.shape[0]):
-        for col in range(out.shape[1]):
-            grey = none
-            if out.shape[2] == 1:
+        light, shown = linear[row].reshape(-1), out[row].reshape(-1)
+        if channels == 1:
+            for i in range(width):
+                grey = none
                 for c in range(3):
-                    grey += luma[c] * linear[row, col, c]
-            for c in range(out.shape[2]):
-                value = grey if out.shape[2] == 1 else linear[row, col, c]
-                value = min(max(value * exposure, none), one)
-                if noisy:
-                    z = normals[drawn[row, col, c]]
-                    spread2 = shot * value + read2 + tiny
-                    skew = sixth * shot * shot * value / spread2
-                    value += np.sqrt(spread2) * z + skew * (z * z - one)
-                    value = min(max(value, none), one)
-                out[row, col, c] = display[np.int32(value * top + half)]
+                    grey += luma[c] * light[3 * i + c]
+                value[i] = grey
+        else:
+            for i in range(width):
+                value[i] = light[i]
+        for i in range(width):
+            value[i] = min(max(value[i] * exposure, none), one)
+        if noisy:
+            word = drawn[row].reshape(-1)
+            for i in range(width):
+                z[i] = normals[word[i]]
+            for i in range(width):
+                spread2 = shot * value[i] + read2 + tiny
+                skew = sixth * shot * shot * value[i] / spread2
+                noisy_value = value[i] + (np.sqrt(spread2) * z[i] + skew * (z[i] * z[i] - one))
+                value[i] = min(max(noisy_value, none), one)
+        for i in range(width):
+            code[i] = np.int32(value[i] * top + half)
+        for i in range(width):
+            shown[i] = display[code[i]]

@@ -19,8 +19,17 @@ STEP = 1e-6  # of the finite differences that tell a fold
 def pixel_directions(camera: PinholeCamera) -> Float64[np.ndarray, "h w 3"]:
     """Unit vectors in the optical frame (x right, y down, z forward) through the pixels' centres.
 
-    Pixel (row r, column c) has its centre at (u, v) = (c + 0.5, r + 0.5). Read-only, kept per camera. Raises
-    BadInput where a pixel has no direction, or the lens folds the picture over itself.
+    Pixel (row r, column c) has its centre at (u, v) = (c + 0.5, r + 0.5). Read-only, kept per camera: a view
+    of `direction_planes`. Raises BadInput as that does.
+    """
+    return direction_planes(camera).transpose(0, 2, 1)
+
+
+@lru_cache(maxsize=8)
+def direction_planes(camera: PinholeCamera) -> Float64[np.ndarray, "h 3 w"]:
+    """The same with the pixels of a row side by side, as kernels read them.
+
+    Raises BadInput where a pixel has no direction, or the lens folds the picture over itself.
     """
     u, v = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)
     slope = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1))
@@ -30,7 +39,7 @@ def pixel_directions(camera: PinholeCamera) -> Float64[np.ndarray, "h w 3"]:
     direction[..., :2] = slope.reshape(camera.height_px, camera.width_px, 2)
     direction[..., 2] = 1.0
     direction /= np.sqrt(np.einsum("hwi,hwi->hw", direction, direction))[..., None]
-    return readonly(direction)
+    return readonly(direction.transpose(0, 2, 1))
 
 
 @lru_cache(maxsize=8)
@@ -48,7 +57,7 @@ def row_fans(camera: PinholeCamera) -> rays.Fans:
         normal = np.stack([zero, one, -y], axis=1) * scale[:, None]
         frame = np.stack([ahead, np.stack([one, zero, zero], axis=1), normal], axis=2)
         return rays.make_alike_fans(frame, x, scale, rows, rows * camera.width_px, 1)
-    direction = pixel_directions(camera)
+    direction = np.ascontiguousarray(pixel_directions(camera))
     # The plane of a row's ends (any plane near it will do: a bent row leaves it by its skew).
     across = direction[:, -1] - direction[:, 0]
     across /= np.linalg.norm(across, axis=1)[:, None]

@@ -67,7 +67,7 @@ def toward_sun() -> Float64[np.ndarray, " 3"]:
 def shade(
     exposure: Exposure,
     palette: Palette,
-    direction: Float64[np.ndarray, "h w 3"],
+    direction: Float64[np.ndarray, "h 3 w"],
     pixel_rad: float,
     range_m: Float64[np.ndarray, "h w"],
     geom: Int32[np.ndarray, "h w"],
@@ -153,7 +153,7 @@ def _veil(far, haze_m):  # type: ignore[no-untyped-def]
 def _sky_run(R, direction, start, stop, sky, out):  # type: ignore[no-untyped-def]
     levels = sky.shape[0] - 1
     for col in range(start, stop):
-        up = R[2, 0] * direction[col, 0] + R[2, 1] * direction[col, 1] + R[2, 2] * direction[col, 2]
+        up = R[2, 0] * direction[0, col] + R[2, 1] * direction[1, col] + R[2, 2] * direction[2, col]
         i = int(min(max(up, 0.0), 1.0) * levels + 0.5)
         out[col, 0], out[col, 1], out[col, 2] = sky[i, 0], sky[i, 1], sky[i, 2]
 
@@ -163,7 +163,7 @@ def _spot(R, o, direction, range_m, pixel, start, stop, x, y, wide_x, wide_y):  
     """Where a run of pixels meets the ground, and how many metres each covers there along x and y."""
     for i in range(stop - start):
         col = start + i
-        ex, ey, ez = direction[col, 0], direction[col, 1], direction[col, 2]
+        ex, ey, ez = direction[0, col], direction[1, col], direction[2, col]
         dx = R[0, 0] * ex + R[0, 1] * ey + R[0, 2] * ez
         dy = R[1, 0] * ex + R[1, 1] * ey + R[1, 2] * ez
         dz = R[2, 0] * ex + R[2, 1] * ey + R[2, 2] * ez
@@ -302,7 +302,7 @@ def _geom_run(  # type: ignore[no-untyped-def]
             local_sun[r] += frame[3 * c + r] * sun[c]
             to_local[r, c] = frame[r] * R[0, c] + frame[3 + r] * R[1, c] + frame[6 + r] * R[2, c]
     for col in range(start, stop):
-        ex, ey, ez, far = direction[col, 0], direction[col, 1], direction[col, 2], range_m[col]
+        ex, ey, ez, far = direction[0, col], direction[1, col], direction[2, col], range_m[col]
         for r in range(3):
             d[r] = to_local[r, 0] * ex + to_local[r, 1] * ey + to_local[r, 2] * ez
             p[r] = eye[r] + far * d[r]
