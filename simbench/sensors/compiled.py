@@ -48,7 +48,9 @@ def jit_with(*modules: ModuleType) -> Callable[[Callable[..., Any]], Any]:
 
     def compile(function: Callable[..., Any]) -> Any:
         compiled = jit(function)
-        index = compiled._cache._cache_file
+        index: Any = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+        if not hasattr(index, "_source_stamp"):  # a numba that keeps it elsewhere: no cache is never stale
+            return numba.njit(nogil=True, error_model="numpy")(inspect.unwrap(function))
         index._source_stamp = (index._source_stamp, *digests)
         return compiled
 
