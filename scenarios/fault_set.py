@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from scenarios.errors import BadInput, FieldPath, Where, show
 from scenarios.faults import FAULTS, FaultSpec, RoadShake, Vibration
+from scenarios.faults.spec import Profile
 from scenarios.library import find, names, shown, user_file
 from scenarios.validate import validate
 from scenarios.yaml_source import parse_yaml, read_yaml
@@ -152,23 +153,25 @@ def load_fault_set(name_or_path: str) -> FaultChange:
     return FaultChange(specs=_ordered(specs), label=path.stem)
 
 
-def parse_fault_arguments(arguments: Sequence[str]) -> FaultChange:
+def parse_fault_arguments(arguments: Sequence[str], profile: Profile = "car") -> FaultChange:
     """What the values of `--faults` ask for, later ones winning. Each is the name or path of a fault set,
-    `none`, or `fault=value` with a number or a mapping like `{offset_ms: 50, jitter_ms: 5}`.
+    `none`, `fault=value` with a number or a mapping like `{offset_ms: 50, jitter_ms: 5}`, or `fault@3` for
+    its severity 3 on the body of `profile`.
 
     BadInput: unknown or malformed.
     """
     change = FaultChange()
     for argument in arguments:
-        change = change.then(_parse_argument(argument.strip()))
+        change = change.then(_parse_argument(argument.strip(), profile))
     return change
 
 
-def _parse_argument(argument: str) -> FaultChange:
+def _parse_argument(argument: str, profile: Profile) -> FaultChange:
     if argument == NONE:
         return FaultChange(clears=True)
     if "=" not in argument:
-        return load_fault_set(argument)
+        name, at, level = argument.partition("@")
+        return _severe(name, level, profile) if at and "/" not in argument else load_fault_set(argument)
     name, text = argument.split("=", 1)
     where = Where(file=OPTION)
     if name not in FAULTS:
@@ -177,6 +180,17 @@ def _parse_argument(argument: str) -> FaultChange:
         raise where.error("needs a value", (name,))
     value = parse_yaml(text, f"{OPTION} {name}").data
     return FaultChange(specs=_ordered(parse_specs({name: value}, where)), label=argument)
+
+
+def _severe(name: str, level: str, profile: Profile) -> FaultChange:
+    from scenarios.severity import severe
+
+    where = Where(file=OPTION)
+    if name not in FAULTS:
+        raise where.unknown("fault", name, FAULTS)
+    if not level.isdecimal():
+        raise where.error(f"severity must be a whole number, is {show(level)}", (name,), allowed="1 to 5")
+    return FaultChange(specs=(severe(name, int(level), profile),), label=f"{name}@{level}")
 
 
 def _ordered(specs: Mapping[str, FaultSpec]) -> tuple[FaultSpec, ...]:

@@ -165,7 +165,7 @@ def demo(
     help="May be repeated. Default: the raw box (with and without ground), the paper's method and 'robust'.",
 )  # fmt: skip
 @click.option(
-    "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE",
+    "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE|KEY@SEVERITY",
     help="Replaces the scenario's same fault, adds the others; 'none' clears. May be repeated.",
 )  # fmt: skip
 @click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
@@ -487,17 +487,25 @@ def list_(kind: str) -> None:
 
 
 @main.command()
-@click.argument("name")
-@click.option("--seed", type=click.IntRange(0), default=0, help="Which of the family.")
-def describe(name: str, seed: int) -> None:
-    """Print the concrete scenario of a seed, every number fixed.
+@click.argument("words", nargs=-1, required=True, metavar="SCENARIO | fault NAME")
+@click.option("--seed", type=click.IntRange(0), default=0, help="Which of the scenario's family.")
+def describe(words: tuple[str, ...], seed: int) -> None:
+    """Print the concrete scenario of a seed, every number fixed; or a fault: its formula, fields and
+    severities.
 
     Example: simbench describe overtake-approach --seed 3
     """
+    if words[0] == "fault" and len(words) == 2:
+        from scenarios.describe_fault import describe_fault
+
+        click.echo(describe_fault(words[1]))
+        return
+    if len(words) != 1:
+        raise click.UsageError("one scenario, or the word 'fault' and the name of one")
     from scenarios.describe import describe as text
     from scenarios.load import load_scenario
 
-    click.echo(text(load_scenario(name).resolve(seed)), nl=False)
+    click.echo(text(load_scenario(words[0]).resolve(seed)), nl=False)
 
 
 @main.command()

@@ -55,7 +55,10 @@ def stage(job: Job) -> Stage:
 def faults_of(job: Job, family: Family, scenario: Scenario) -> FaultSet:
     """The scenario's own faults with the job's on top."""
     own = family.fault_set(scenario)
-    return own.override(parse_fault_arguments(job.faults)) if job.faults else own
+    if not job.faults:
+        return own
+    body = family.rig(scenario.system(job.system).rig).body
+    return own.override(parse_fault_arguments(job.faults, "car" if body == "vehicle" else "rider"))
 
 
 def set_stage(

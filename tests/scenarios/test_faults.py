@@ -19,7 +19,7 @@ from scenarios.fault_set import (
     parse_faults,
 )
 from scenarios.faults import FAULTS, EdgeError, RoadShake, TriggerOffset, Vibration
-from scenarios.severity import SEVERITIES, road_class, severe
+from scenarios.severity import SEVERITIES, Severity, road_class, severe
 
 FILE = Where(file="f.yaml")
 WORDS = {0: "smooth", 0.25: "A", 0.5: "B", 1: "C"}
@@ -114,6 +114,29 @@ def test_a_bare_value_sets_the_strength_and_the_least_is_off(name: str) -> None:
     assert (
         kind.name == name and (kind.__doc__ or "").count("Unit:") == 1 and "Source:" in (kind.__doc__ or "")
     )
+
+
+@pytest.mark.parametrize("severity", SEVERITIES, ids=lambda s: f"{s.fault}-{s.profile}")
+def test_every_severity_can_be_asked_for_by_its_number(severity: Severity) -> None:
+    profile = severity.profile or "car"
+    specs = [parse_fault_arguments([f"{severity.fault}@{level}"], profile).specs for level in range(1, 6)]
+    assert [spec for (spec,) in specs] == [severe(severity.fault, level, profile) for level in range(1, 6)]
+    assert len({repr(spec) for spec in specs}) == 5
+
+
+@pytest.mark.parametrize(
+    ("argument", "words"),
+    [
+        ("timing.trigger_offset_ms@6", ("severity 6", "1 to 5")),
+        ("timing.trigger_offset_ms@0", ("severity 0", "1 to 5")),
+        ("timing.trigger_offset_ms@x", ("'x'", "1 to 5")),
+        ("timing.triger_offset_ms@3", ("did you mean 'timing.trigger_offset_ms'?",)),
+    ],
+)
+def test_a_severity_that_is_not_there_costs_one_sentence(argument: str, words: tuple[str, ...]) -> None:
+    with pytest.raises(BadInput) as error:
+        parse_fault_arguments([argument])
+    assert all(word in str(error.value) for word in words), str(error.value)
 
 
 def test_jitter_or_bias_alone_is_not_off() -> None:

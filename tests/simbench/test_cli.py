@@ -18,6 +18,8 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
+from scenarios.fault_set import parse_fault_arguments
+from scenarios.faults import FAULTS
 from scenarios.load import load_scenario
 from simbench.case import Job
 from simbench.cli import main
@@ -266,6 +268,22 @@ def test_nothing_selected_has_a_code_of_its_own(empty_folder: Path) -> None:
 
 
 # -- what commands give -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", sorted(FAULTS))
+def test_describe_fault_tells_formula_fields_and_what_every_severity_is(name: str) -> None:
+    done = run("describe", "fault", name)
+    assert done.exit_code == 0 and done.output.startswith(name + "\n")
+    assert "Unit:" in done.output and "Source:" in done.output
+    for field in FAULTS[name].model_fields:
+        assert f"\n  {field} = " in done.output
+    for level in re.findall(rf"^  [1-5]  ({re.escape(name)}=.*)$", done.output, re.MULTILINE):
+        assert len(parse_fault_arguments([level]).specs) == 1, "each is what --faults takes"
+
+
+def test_an_unknown_fault_is_told_what_was_meant() -> None:
+    done = run("describe", "fault", "timing.triger_offset_ms")
+    assert done.exit_code == 2 and "did you mean 'timing.trigger_offset_ms'?" in done.stderr
 
 
 @pytest.mark.parametrize("name", ["overtake-approach", "static-board", "empty-road"])
