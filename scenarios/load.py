@@ -9,12 +9,13 @@ its choices. Whatever is wrong raises `BadInput`, with file, line and field.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scenarios.categories import SIZE_SPREAD
+from scenarios.changes import changed
 from scenarios.distributions import Distribution, Uniform, Value, corners, find_distributions, substitute
 from scenarios.equipment import list_rigs, list_sensors, load_rig, load_sensor
 from scenarios.errors import BadInput, FieldPath, Where, show
@@ -115,8 +116,10 @@ def list_scenarios() -> tuple[str, ...]:
     return names("scenario")
 
 
-def load_scenario(name_or_path: str) -> Family:
-    """The family of a catalogue name, or of a path to a .yaml file. BadInput: unknown or malformed."""
+def load_scenario(name_or_path: str, changes: Sequence[str] = ()) -> Family:
+    """The family of a catalogue name, or of a path to a .yaml file, with some values replaced (`changes.py`).
+    BadInput: unknown or malformed.
+    """
     path = user_file(name_or_path, "scenario")
     if path is None:
         document = read_yaml(ours := find("scenario", name_or_path), shown(ours))
@@ -125,6 +128,8 @@ def load_scenario(name_or_path: str) -> Family:
     tree, where = document.data, document.where
     if not isinstance(tree, dict):
         raise where.error(f"a scenario file is a mapping, this one is {show(tree)}")
+    if changes:
+        tree = changed(tree, changes)
     distributions = find_distributions(tree, where)
     for key in ("name", "description", "systems"):
         if (key,) in distributions or () in distributions:

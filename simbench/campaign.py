@@ -6,10 +6,13 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
 
 from simbench.case import Job, JobResult
 from simbench.run import run_job
 
+Task = TypeVar("Task")
+Result = TypeVar("Result")
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
@@ -19,24 +22,29 @@ def run_jobs(
     """Run all jobs; `done` hears of each as it is collected. Raises what a job raises (bad input, no
     renderer).
     """
+    if min(workers, len(jobs)) > 1:
+        _find_renderer_once(jobs)
     results = []
-    for result in _collect(jobs, min(workers, len(jobs))):
+    for result in each_of(run_job, jobs, workers):
         done(result)
         results.append(result)
     return tuple(results)
 
 
-def _collect(jobs: Sequence[Job], workers: int) -> Iterator[JobResult]:
+def each_of(work: Callable[[Task], Result], tasks: Sequence[Task], workers: int) -> Iterator[Result]:
+    """What `work` makes of each task, in their order, by up to `workers` processes; `work` is a function of a
+    module. Raises what it raises.
+    """
+    workers = min(workers, len(tasks))
     if workers <= 1:
-        yield from map(run_job, jobs)
+        yield from map(work, tasks)
         return
-    _find_renderer_once(jobs)
     for name in ONE_THREAD:
         os.environ.setdefault(name, "1")
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=workers, mp_context=context) as pool:
         try:
-            yield from pool.map(run_job, jobs)
+            yield from pool.map(work, tasks)
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -40,6 +40,7 @@ class Job:
     size_px: tuple[int, int] | None = None
     boxes: Boxes | None = None
     frames: tuple[int, int] | None = None
+    changes: tuple[str, ...] = ()  # of the scenario file, as `--set` gives them
     calibration: str = "true"  # as `--calibration` gives it
     found_in: str | None = None  # the file of the found calibration that the pipelines are told
 

@@ -1,4 +1,4 @@
-"""The command line: `simbench demo | run | calibrate | list | describe | timeline | doctor | learn`.
+"""The command line: `simbench demo | run | stress | calibrate | list | describe | timeline | doctor | learn`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
@@ -168,6 +168,10 @@ def demo(
     "--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE|KEY@SEVERITY",
     help="Replaces the scenario's same fault, adds the others; 'none' clears. May be repeated.",
 )  # fmt: skip
+@click.option(
+    "--set", "changes", multiple=True, metavar="PATH=VALUE",
+    help="Replaces a value of the scenario file, as systems.car.duration_s=3. May be repeated.",
+)  # fmt: skip
 @click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
 @click.option(
     "--boxes", type=click.Choice(["labels", "model"]), default=None,
@@ -184,7 +188,8 @@ def demo(
 )  # fmt: skip
 @_common("out/run")
 def run(
-    targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...], alone: bool,
+    targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
+    changes: tuple[str, ...], alone: bool,
     boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...],
     images: Images, jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
@@ -213,6 +218,8 @@ def run(
         load_pipeline(name)
     recorded = [target for target in dict.fromkeys(targets) if is_recorded(target)]
     planned = []
+    if recorded and changes:
+        raise click.UsageError("--set is for simulated drives: what was recorded has happened")
     if recorded and calibration != "true":
         raise click.UsageError("--calibration is for simulated drives: recorded data bring their own")
     if recorded:
@@ -229,7 +236,7 @@ def run(
     for target in dict.fromkeys(targets):
         if target in recorded:
             continue
-        family = load_scenario(target)
+        family = load_scenario(target, changes)
         for name in family.system_names if system == "both" else (system,):
             if calibration == "found":
                 click.echo(f"calibrating the rig of {name}: this takes about a minute", err=True)
@@ -237,7 +244,8 @@ def run(
             for seed in seeds:
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
-                    images=images, size_px=size, boxes=boxes, calibration=calibration, found_in=found_in,
+                    images=images, size_px=size, boxes=boxes, changes=changes, calibration=calibration,
+                    found_in=found_in,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
@@ -387,6 +395,48 @@ def _quoted(word: str) -> str:
     import shlex
 
     return shlex.quote(word)
+
+
+@main.command()
+@click.argument("scenario")
+@click.option(
+    "--vary", "axes", multiple=True, required=True, metavar="NAME=LOW:HIGH:COUNT|NAME=A,B",
+    help="A fault's field or a value of the scenario file. May be repeated.",
+)  # fmt: skip
+@click.option("--design", type=click.Choice(["grid", "lhs", "sobol"]), default="grid", show_default=True)
+@click.option(
+    "--points", type=click.IntRange(2, 100000), default=30, show_default=True, help="Of lhs and sobol."
+)
+@click.option("--system", type=click.Choice(["car", "wearable"]), help="Which rig (default: the first).")
+@click.option(
+    "--pipeline", "pipelines", multiple=True, metavar="NAME", help="May be repeated. Default: as run."
+)
+@click.option("--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE", help="At all points.")
+@click.option("--set", "changes", multiple=True, metavar="PATH=VALUE", help="At all points.")
+@click.option("--boxes", type=click.Choice(["labels", "model"]), default=None, help="As for run.")
+@click.option("--seeds", default="0-3", callback=_seeds, show_default=True, help="Runs at every point.")
+@click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
+@click.option("--out", type=click.Path(path_type=Path), default=Path("out/stress"), show_default=True)
+def stress(
+    scenario: str, axes: tuple[str, ...], design: str, points: int, system: str | None,
+    pipelines: tuple[str, ...], faults: tuple[str, ...], changes: tuple[str, ...], boxes: Boxes | None,
+    seeds: tuple[int, ...], jobs: int | None, out: Path,
+) -> None:  # fmt: skip
+    """Run a scenario over a grid of errors, or of anything in its file; write stress.html and stress.csv.
+
+    A ledger in the folder keeps every recording as it is done: the same command again goes on where it
+    stopped.
+
+    Example: simbench stress overtake-approach --vary timing.trigger_offset_ms=0:150:4 --seeds 0-1
+    """
+    from simbench.stress.command import run_stress
+
+    code = run_stress(
+        scenario, axes, design=design, points=points, system=system,
+        pipelines=tuple(dict.fromkeys(pipelines)) or DEFAULT, faults=faults, changes=changes, boxes=boxes,
+        seeds=seeds, workers=jobs, out=out,
+    )  # fmt: skip
+    raise SystemExit(code)
 
 
 @main.command()

@@ -63,6 +63,8 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
     words += ["--seeds", str(job.seed)]
     for text in job.faults:
         words += ["--faults", text]
+    for text in job.changes:
+        words += ["--set", text]
     if job.faults != ("none",):
         words.append("--alone")  # this case only, not the same drive with errors off
     if job.boxes is not None:

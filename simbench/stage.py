@@ -43,7 +43,7 @@ class Stage:
 
 def stage(job: Job) -> Stage:
     """Resolve scenario, faults and rig of a job and build its world. Raises BadInput."""
-    family = load_scenario(job.scenario)
+    family = load_scenario(job.scenario, job.changes)
     scenario = family.resolve(job.seed)
     faults = faults_of(job, family, scenario)
     staged = set_stage(family, scenario, job.system, faults, job.seed, job.size_px)

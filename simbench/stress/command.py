@@ -1,0 +1,88 @@
+"""`simbench stress`: check everything before anything runs, measure, write."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+from shlex import join
+from typing import cast
+
+import click
+
+from simbench.case import Boxes, Job
+from simbench.files import prepare_folder, write_text
+from simbench.plugins import load_pipeline
+from simbench.report.stress_page import at, write_page
+from simbench.stage import stage
+from simbench.stress.axes import parse_axes
+from simbench.stress.ledger import Ledger, Outcome
+from simbench.stress.plan import Design, grid, jobs_of, scattered
+from simbench.stress.run import measure
+from simbench.stress.table import as_csv
+
+FAILED, BENCH_ERROR = 1, 3
+
+
+def run_stress(
+    scenario: str,
+    axes: tuple[str, ...],
+    *,
+    design: str,
+    points: int,
+    system: str | None,
+    pipelines: tuple[str, ...],
+    faults: tuple[str, ...],
+    changes: tuple[str, ...],
+    boxes: Boxes | None,
+    seeds: tuple[int, ...],
+    workers: int | None,
+    out: Path,
+) -> int:
+    """The exit code: 0 all well, 1 a pipeline failed somewhere, 3 the bench did. Raises BadInput."""
+    from scenarios.load import load_scenario
+
+    parsed = parse_axes(axes)
+    plan = grid(parsed) if design == "grid" else scattered(parsed, points, cast(Design, design))
+    for name in pipelines:
+        load_pipeline(name)
+    family = load_scenario(scenario, changes)
+    template = Job(
+        scenario=scenario, system=system or family.system_names[0], seed=0, pipelines=pipelines,
+        faults=faults, boxes=boxes, changes=changes,
+    )  # fmt: skip
+    tasks = jobs_of(plan, template, seeds)
+    for point in (plan.points[0], plan.points[-1]):  # a bad combination costs one sentence and no time
+        stage(next(job for other, job in tasks if other == point))
+    prepare_folder(out)
+    what = {
+        "scenario": scenario, "system": template.system, "axes": list(axes), "design": design,
+        "points": len(plan.points), "pipelines": list(pipelines), "faults": list(faults),
+        "changes": list(changes), "boxes": boxes,
+    }  # fmt: skip
+    ledger = Ledger(out, what)
+    fresh = sum((point, job.seed) not in ledger.done for point, job in tasks)
+    begun, told = time.perf_counter(), [0]
+    if fresh < len(tasks):
+        click.echo(f"{len(tasks) - fresh} of {len(tasks)} recordings are there already", err=True)
+
+    def done(outcomes: tuple[Outcome, ...]) -> None:
+        told[0] += 1
+        left_s = (time.perf_counter() - begun) / told[0] * (fresh - told[0])
+        statuses = ", ".join(sorted({outcome.status for outcome in outcomes}))
+        words = f"{at(plan.axes, outcomes[0].point)}, seed {outcomes[0].seed}: {statuses}"
+        click.echo(f"[{told[0]}/{fresh}] {words} ({left_s / 60:.1f} min left)", err=True)
+
+    outcomes = measure(tasks, ledger, workers or os.cpu_count() or 1, done)
+    wall_s = time.perf_counter() - begun
+    write_text(out / "stress.csv", as_csv(plan.axes, outcomes))
+    page = write_page(
+        plan, outcomes, out, title=f"{family.name}, {template.system}",
+        command=join(["simbench", *sys.argv[1:]]), wall_s=wall_s, fresh=fresh,
+    )  # fmt: skip
+    click.echo(f"report: {page}")
+    statuses = {outcome.status for outcome in outcomes}
+    if statuses & {"bench_error", "receipt_mismatch"}:
+        return BENCH_ERROR
+    return FAILED if statuses - {"ok"} else 0
