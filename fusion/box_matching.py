@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -28,6 +28,7 @@ class MatchingConfig:
     place_cap: float = 6.0
     least_score: float = -16.0  # below it a box has no object
     keep: int = 3  # candidates per track
+    late_s: float = 0.1  # how far an image's stamp may be off: what the ego turns in it is room to look
     largest: float = 2.5  # a cluster reaching over more than this times the category's diagonal is no object
 
 
@@ -62,6 +63,8 @@ def match_boxes(
     the image. ValueError: a category without size.
     """
     T_camera_scene = frame.T_camera_scene(camera_name, stamp_ns, scene.pose) if usable else None
+    room_rad = config.candidates.reach_rad + frame.turned_rad(stamp_ns, config.late_s)
+    looking = replace(config.candidates, reach_rad=room_rad)
     sizes_of = [size_of(detection.category, sizes) for detection, _ in usable]
     groups: dict[bool, list[int]] = {}
     for place, size in enumerate(sizes_of):
@@ -79,7 +82,7 @@ def match_boxes(
             camera,
             boxes_px,
             config.largest * max(math.hypot(*size.mean_m[:2]) for size in expected),
-            config.candidates,
+            looking,
         )
         moved_m = np.stack(
             [
@@ -94,7 +97,7 @@ def match_boxes(
             expected,
             moved_m @ T_camera_scene.rotation.T,
             scene.beams_per_sr,
-            config.candidates,
+            looking,
         )
         fits |= dict(zip(places, found, strict=True))
     return [

@@ -42,6 +42,11 @@ class WorkingFrame:
         seen = T_camera_work.rotation @ moved
         return Transform(rotation=seen[:, :3], translation_m=seen[:, 3] + T_camera_work.translation_m)
 
+    def turned_rad(self, stamp_ns: int, within_s: float) -> float:
+        """By how much the ego turned in the time before a stamp, either way."""
+        yaw = self.odometry.pose(np.array([stamp_ns - round(within_s * 1e9), stamp_ns]))[:, 2]
+        return abs(float(yaw[1] - yaw[0]))
+
     def beams_per_sr(self, scan: LidarScan) -> float | None:
         """How dense a LiDAR's beams are, measured on its first scan with two rings or more; None before."""
         if self._beams_per_sr.get(scan.sensor) is None:
