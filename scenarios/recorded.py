@@ -1,7 +1,7 @@
 """Faults that can be injected into recorded data, and how `--faults` asks for them.
 
 What was recorded has happened: nothing can shake a body or move a shutter any more. What the fusion is told,
-and what it is given, can still be changed. Two faults are those of the simulator, three act on recordings
+and what it is given, can still be changed. Three faults are those of the simulator, two act on recordings
 only.
 """
 
@@ -14,7 +14,7 @@ from pydantic import Field
 
 from scenarios.errors import BadInput, Where
 from scenarios.fault_set import NONE, OPTION, FaultChange, FaultSet, parse_fault_arguments
-from scenarios.faults import FAULTS, CalibrationRotation, Cameras, EdgeError, FaultSpec
+from scenarios.faults import FAULTS, CalibrationRotation, Cameras, EdgeError, FaultSpec, StaleFrames
 from scenarios.validate import validate
 from scenarios.yaml_source import parse_yaml
 
@@ -38,21 +38,6 @@ class PixelShift(FaultSpec):
     sensors: Cameras = "cameras"
 
 
-class StaleFrames(FaultSpec):
-    """The camera delivers, under each image's stamp, the image and the boxes of `frames` frames before.
-
-    The first frames have nothing before them: they are delivered without boxes. Needs a sequence.
-    Unit: frames. Source: judgement.
-    """
-
-    name: ClassVar[str] = "timing.stale_frames"
-    strength: ClassVar[str] = "frames"
-    zero_when_off: ClassVar[tuple[str, ...]] = ("frames",)
-    unit: ClassVar[str] = "frames"
-
-    frames: Annotated[int, Field(ge=0, le=100)] = 0
-
-
 class BeamLoss(FaultSpec):
     """The LiDAR loses whole beams: `percent` of its rings return nothing, over the whole recording.
 
@@ -70,9 +55,7 @@ class BeamLoss(FaultSpec):
     pattern: Literal["random", "even"] = "random"
 
 
-ONLY_RECORDED: Mapping[str, type[FaultSpec]] = {
-    spec.name: spec for spec in (PixelShift, BeamLoss, StaleFrames)
-}
+ONLY_RECORDED: Mapping[str, type[FaultSpec]] = {spec.name: spec for spec in (PixelShift, BeamLoss)}
 ON_RECORDINGS: Mapping[str, type[FaultSpec]] = {
     spec.name: spec for spec in (PixelShift, CalibrationRotation, EdgeError, BeamLoss, StaleFrames)
 }

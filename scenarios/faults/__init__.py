@@ -13,20 +13,49 @@ from scenarios.faults import calibration, camera, detector, lidar, motion, refer
 from scenarios.faults.calibration import CalibrationRotation
 from scenarios.faults.detector import EdgeError
 from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
-from scenarios.faults.spec import Cameras, FaultSpec
-from scenarios.faults.timing import TriggerOffset
+from scenarios.faults.spec import Cameras, FaultSpec, Sensors
+from scenarios.faults.timing import (
+    ClockDrift,
+    ClockOffset,
+    Dropped,
+    Duplicated,
+    Frozen,
+    Latency,
+    Reordered,
+    StaleFrames,
+    StampJitter,
+    StampMeaning,
+    StampOnSave,
+    StampQuantum,
+    StampStep,
+    TriggerOffset,
+)
 
 __all__ = [
     "FAMILIES",
     "FAULTS",
     "CalibrationRotation",
     "Cameras",
+    "ClockDrift",
+    "ClockOffset",
+    "Dropped",
+    "Duplicated",
     "EdgeError",
     "FaultSpec",
     "Flex",
+    "Frozen",
+    "Latency",
+    "Reordered",
     "RoadEvent",
     "RoadShake",
     "Roughness",
+    "Sensors",
+    "StaleFrames",
+    "StampJitter",
+    "StampMeaning",
+    "StampOnSave",
+    "StampQuantum",
+    "StampStep",
     "TriggerOffset",
     "Vibration",
 ]

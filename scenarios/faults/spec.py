@@ -13,6 +13,8 @@ from scenarios.scenario import Name, Spec, broken
 Cameras = Literal["cameras"] | tuple[Name, ...]
 """All cameras of the rig, or some by their names."""
 
+Sensors = Literal["cameras", "lidar"] | tuple[Name, ...]
+"""All cameras of the rig, its LiDAR (whatever its name), or some cameras by their names."""
 
 Level = float | str | Mapping[str, float | str]
 """A fault's strength, or values of several of its fields."""
@@ -59,7 +61,7 @@ class FaultSpec(Spec):
     def named_cameras(self) -> tuple[str, ...]:
         """The cameras that this spec names one by one; empty when it means all of them."""
         sensors = getattr(self, "sensors", "cameras")
-        return () if sensors == "cameras" else tuple(sensors)
+        return () if isinstance(sensors, str) else tuple(sensors)
 
     @model_validator(mode="after")
     def _names_cameras_once(self) -> FaultSpec:

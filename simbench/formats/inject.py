@@ -12,8 +12,8 @@ from fusion.geometry import readonly
 from fusion.messages import BoxPx, Calibration
 from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError
-from scenarios.recorded import BeamLoss, PixelShift, StaleFrames
+from scenarios.faults import CalibrationRotation, EdgeError, StaleFrames
+from scenarios.recorded import BeamLoss, PixelShift
 from scenarios.seeding import stream
 from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
