@@ -89,7 +89,7 @@ class StampOnSave(FaultSpec):
 
     stamp' = t + delay_ms + w, t being the true middle of the exposure or the true first firing, and w an
     exponentially distributed wait of mean jitter_ms. What the stamp said before is lost. One file is saved
-    after the other: stamps ascend.
+    after the other: stamps ascend. A delay_ms of 0 is off.
     Unit: milliseconds. Source: judgement (20-100 ms late, jitter 5-15 ms).
     """
 

@@ -31,7 +31,7 @@ def _stale(spec: StaleFrames, delivery: Delivery, site: Site) -> Acted:
         return Acted(delivery=delivery, realised={})
     shots, k = dict(delivery.shots), spec.frames
     for name in struck(spec, site.rig):
-        now = _by_stamp(delivery.shots[name])
+        now = _in_order(delivery.shots[name])
         shots[name] = tuple(_under(now[i - k], now[i]) for i in range(k, len(now)))
     realised = {f"{name} delay": float(k) for name in struck(spec, site.rig)}
     return Acted(delivery=_with(delivery, shots), realised=realised)
@@ -42,7 +42,7 @@ def _frozen(spec: Frozen, delivery: Delivery, site: Site) -> Acted:
         return Acted(delivery=delivery, realised={})
     shots, realised = dict(delivery.shots), {}
     for name in struck(spec, site.rig):
-        now = _by_stamp(delivery.shots[name])
+        now = _in_order(delivery.shots[name])
         frozen = stream(site.seed, "fault", spec.name, name).uniform(size=len(now)) < 0.01 * spec.percent
         frozen[:1] = False
         source = np.maximum.accumulate(np.where(frozen, 0, np.arange(len(now))))
@@ -51,8 +51,8 @@ def _frozen(spec: Frozen, delivery: Delivery, site: Site) -> Acted:
     return Acted(delivery=_with(delivery, shots), realised=realised)
 
 
-def _by_stamp(shots: Sequence[Shot]) -> list[Shot]:
-    return sorted(shots, key=lambda shot: shot.stamp_ns)
+def _in_order(shots: Sequence[Shot]) -> list[Shot]:
+    return sorted(shots, key=lambda shot: shot.arrival_ns)
 
 
 def _with(delivery: Delivery, shots: dict[str, tuple[Shot, ...]]) -> Delivery:
@@ -67,15 +67,15 @@ def _with(delivery: Delivery, shots: dict[str, tuple[Shot, ...]]) -> Delivery:
 def _ages(step: Step, camera: str) -> list[int] | None:
     """How many frames old what every delivered frame shows is; None where message and truth disagree.
 
-    Age by the truth: places between the exposure that this stamp had and the one that is shown. The boxes
+    Age by the truth: places between the exposure that this arrival had and the one that is shown. The boxes
     must be those that the shown exposure had.
     """
-    before = _by_stamp(step.before.shots[camera])
-    place = {shot.stamp_ns: i for i, shot in enumerate(before)}
+    before = _in_order(step.before.shots[camera])
+    place = {shot.arrival_ns: i for i, shot in enumerate(before)}
     taken = {shot.truth.capture_ns: i for i, shot in reversed(list(enumerate(before)))}
     ages = []
-    for shot in _by_stamp(step.after.shots[camera]):
-        i, shown = place.get(shot.stamp_ns), taken.get(shot.truth.capture_ns)
+    for shot in _in_order(step.after.shots[camera]):
+        i, shown = place.get(shot.arrival_ns), taken.get(shot.truth.capture_ns)
         if i is None or shown is None or shot.detections.boxes != before[shown].detections.boxes:
             return None
         ages.append(i - shown)
@@ -128,7 +128,7 @@ def _repeats(step: Step, camera: str) -> tuple[float, int]:
     ages = _ages(step, camera)
     if ages is None or len(ages) != len(step.before.shots[camera]):
         return float("nan"), max(len(step.before.shots[camera]) - 1, 1)
-    shots = _by_stamp(step.after.shots[camera])
+    shots = _in_order(step.after.shots[camera])
     again = sum(a.truth.capture_ns == b.truth.capture_ns for a, b in pairwise(shots))
     return float(again), max(len(shots) - 1, 0)
 

@@ -29,6 +29,7 @@ from simbench.faults.chances import late_ns, queued_ns, scattered, spread_by_med
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site
 from simbench.faults.flow import items, struck, true_ns, with_items
+from simbench.faults.receipt import Receipt
 
 MS = 1e-6  # in a nanosecond
 
@@ -99,7 +100,7 @@ def _quantum(spec: StampQuantum, clock: Clock) -> Claimed:
 def _entry(
     kind: type[FaultSpec],
     claim: Callable[[Any, Clock], Claimed],
-    of_one: Callable[..., tuple[stamp_receipts.Receipt, ...]],
+    of_one: Callable[..., tuple[Receipt, ...]],
 ) -> DeliveryFault:
     """A fault that gives struck sensors the stamps that `claim` says."""
 

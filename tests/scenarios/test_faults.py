@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import ceil
 from pathlib import Path
 
 import pytest
@@ -27,7 +28,10 @@ WORDS = {0: "smooth", 0.25: "A", 0.5: "B", 1: "C"}
 
 def strength(name: str, number: float) -> float | str:
     """That much of a fault: the number, or a word where its strength is one."""
-    return WORDS[number] if FAULTS[name].strength_words() else number
+    if FAULTS[name].strength_words():
+        return WORDS[number]
+    whole = FAULTS[name].model_fields[FAULTS[name].strength].annotation is int
+    return ceil(number) if whole else number
 
 
 # Plain inputs, parsed inside the tests: type checks draw at random, which a strategy must not.

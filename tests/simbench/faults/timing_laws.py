@@ -65,7 +65,7 @@ def mutants(spec: FaultSpec) -> Iterator[tuple[str, Delivery]]:
     factors = {"half": 0.5, "twice": 2.0, "a unit too small": 1e-3, "a unit too large": 1e3}
     if type(spec).name.endswith("_percent"):
         factors |= {"fraction": 0.01, "per cent of per cent": 100.0}
-    if type(spec)(**{spec.strength: 0}).model_fields[spec.strength].metadata and _signed(spec):
+    if _signed(spec):
         factors["sign"] = -1.0
     for name, factor in factors.items():
         yield name, acted(by(spec, factor)).delivery
