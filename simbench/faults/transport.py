@@ -105,8 +105,11 @@ def _entry(
 DELIVERED: tuple[DeliveryFault, ...] = (
     *stale.DELIVERED,
     _entry(Dropped, _dropped, transport_receipts.dropped),
-    _entry(Duplicated, _duplicated, transport_receipts.duplicated),
     _entry(Latency, _latency, transport_receipts.latency),
     _entry(Reordered, _reordered, transport_receipts.reordered),
+    _entry(Duplicated, _duplicated, transport_receipts.duplicated),
 )
-"""What the driver hands over, then what the network loses, repeats, delays and mixes up."""
+"""What the driver hands over, then what the network loses, delays, mixes up and repeats.
+
+Copies come last: nobody could see that one of them overtook the other.
+"""
