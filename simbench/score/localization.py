@@ -253,8 +253,10 @@ def _lateral_clearance(frames: Sequence[FrameScore]) -> Estimate:
 
 
 def _ttc(truth: Truth, frames: Sequence[FrameScore]) -> Estimate:
-    """Speeds: of the trajectory by central differences over its own samples, true ones over +-5 ms."""
-    known = _smooth_fixes(frames)
+    """Speeds: of the trajectory by central differences over its own samples, true ones over +-5 ms. A sweep
+    that was delivered twice is one sample.
+    """
+    known = list({f.stamp_ns: f for f in _smooth_fixes(frames)}.values())
     if len(known) < MIN_ERROR_FRAMES:
         return _too_few(len(known))
     t_ns = np.array([f.stamp_ns for f in known], dtype=np.int64)

@@ -41,6 +41,7 @@ def cut(job: Job) -> Stage:
     return replace(coarse, faults=at.faults)
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("sensors", ["cameras", "lidar"])
 @pytest.mark.parametrize("room", [STAMPS, TRANSPORT], ids=["stamps", "transport"])
 def test_a_run_with_every_fault_of_the_room_is_proved_and_scored(room: dict[str, str], sensors: str) -> None:
