@@ -1,20 +1,21 @@
 """Faults that can be injected into recorded data, and how `--faults` asks for them.
 
 What was recorded has happened: nothing can shake a body or move a shutter any more. What the fusion is told,
-and what it is given, can still be changed. Three faults are those of the simulator, two act on recordings
+and what it is given, can still be changed. Four faults are those of the simulator, one acts on recordings
 only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
 from scenarios.errors import BadInput, Where
 from scenarios.fault_set import NONE, OPTION, FaultChange, FaultSet, parse_fault_arguments
 from scenarios.faults import FAULTS, CalibrationRotation, Cameras, EdgeError, FaultSpec, StaleFrames
+from scenarios.faults.lidar import BeamLoss
 from scenarios.validate import validate
 from scenarios.yaml_source import parse_yaml
 
@@ -38,24 +39,7 @@ class PixelShift(FaultSpec):
     sensors: Cameras = "cameras"
 
 
-class BeamLoss(FaultSpec):
-    """The LiDAR loses whole beams: `percent` of its rings return nothing, over the whole recording.
-
-    random draws which ones from the seed; even leaves rings that are spread evenly, as a LiDAR with fewer
-    beams has them. Rounded to whole rings; at least one ring stays.
-    Unit: per cent of the rings. Source: 50 and 75 % are the step from 64 to 32 and to 16 beams.
-    """
-
-    name: ClassVar[str] = "lidar.beam_loss"
-    strength: ClassVar[str] = "percent"
-    zero_when_off: ClassVar[tuple[str, ...]] = ("percent",)
-    unit: ClassVar[str] = "%"
-
-    percent: Annotated[float, Field(ge=0, le=99, allow_inf_nan=False)] = 0.0
-    pattern: Literal["random", "even"] = "random"
-
-
-ONLY_RECORDED: Mapping[str, type[FaultSpec]] = {spec.name: spec for spec in (PixelShift, BeamLoss)}
+ONLY_RECORDED: Mapping[str, type[FaultSpec]] = {spec.name: spec for spec in (PixelShift,)}
 ON_RECORDINGS: Mapping[str, type[FaultSpec]] = {
     spec.name: spec for spec in (PixelShift, CalibrationRotation, EdgeError, BeamLoss, StaleFrames)
 }

@@ -13,10 +13,11 @@ from fusion.messages import BoxPx, Calibration
 from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
 from scenarios.faults import CalibrationRotation, EdgeError, StaleFrames
-from scenarios.recorded import BeamLoss, PixelShift
-from scenarios.seeding import stream
+from scenarios.faults.lidar import BeamLoss
+from scenarios.recorded import PixelShift
 from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
+from simbench.faults.points_lost import lost_rings
 from simbench.formats.calibration import CAMERA
 from simbench.truth import ObjectInfo
 
@@ -83,17 +84,6 @@ def draw_on_recording(
 
 
 _NONE = readonly(np.empty(0), np.int64)
-
-
-def lost_rings(spec: BeamLoss, rings: int, seed: int) -> Int64[np.ndarray, " r"]:
-    """Which of the rings 0 .. rings - 1 are lost, sorted."""
-    kept = max(1, rings - round(0.01 * spec.percent * rings))
-    if spec.pattern == "even":
-        keep = np.floor((np.arange(kept) + 0.5) * rings / kept).astype(np.int64)
-    else:
-        keep = stream(seed, "fault", BeamLoss.name).permutation(rings)[:kept]
-    lost: np.ndarray = np.setdiff1d(np.arange(rings), keep)
-    return lost
 
 
 def moved_box(

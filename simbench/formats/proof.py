@@ -20,7 +20,8 @@ from fusion.geometry import rotation_log
 from fusion.messages import Detections, LidarScan
 from scenarios.fault_set import FaultSet
 from scenarios.faults import CalibrationRotation, EdgeError, StaleFrames
-from scenarios.recorded import BeamLoss, PixelShift
+from scenarios.faults.lidar import BeamLoss
+from scenarios.recorded import PixelShift
 from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults.estimate import CameraEvidence, camera_pose

@@ -25,7 +25,7 @@ from fusion.messages import (
 )
 from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
-from scenarios.recorded import BeamLoss
+from scenarios.faults.lidar import BeamLoss
 from scenarios.scenario import DetectorSpec
 from simbench.case import Boxes
 from simbench.faults.delivery import in_order_of_arrival

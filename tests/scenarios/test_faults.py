@@ -224,6 +224,17 @@ def test_a_fault_set_may_be_a_file(tmp_path: Path) -> None:
         ("timing.trigger_offset_ms={jitter_ms: -1}", "jitter_ms: must not be negative"),
         ("calibration.rotation_deg={axis: up}", "allowed: random, roll, pitch, yaw"),
         ("detector.edge_error={tau_s: -1}", "tau_s: must not be negative"),
+        ("lidar.dropout_percent=101", "percent: must be <= 100, is 101"),
+        ("lidar.dropout_weak={percent: 5, width: 0}", "width: must be >= 0.001"),
+        ("lidar.beam_loss=100", "must be <= 99"),
+        ("lidar.range_noise_cm=-1", "sd_cm: must not be negative"),
+        ("lidar.azimuth_error_deg={eccentricity_deg: -1}", "eccentricity_deg: must not be negative"),
+        ("lidar.dirt_sector={width_deg: 10, opacity: 0}", "opacity: must be > 0"),
+        ("lidar.dirt_sector=361", "must be <= 360"),
+        ("lidar.reduced_range=100", "must be <= 99"),
+        ("lidar.ghosts_percent={percent: 1, max_range_m: 1}", "max_range_m: must be >= 5"),
+        ("lidar.fog_mor_m=-50", "mor_m: must not be negative"),
+        ("lidar.rain_mmph=heavy", "must be a number"),
         ("away/faults.yaml", "away/faults.yaml: no such file"),
         ("", "is empty"),
     ],
@@ -257,7 +268,8 @@ def test_a_smooth_road_with_a_bump_is_not_off() -> None:
 
 def test_severities_rise_and_make_valid_specs() -> None:
     for severity in SEVERITIES:
-        assert list(severity.values) == sorted(set(severity.values))
+        falls = severity.fault == "lidar.fog_mor_m"  # the less one sees, the denser the fog
+        assert list(severity.values) == sorted(set(severity.values), reverse=falls)
         for level, value in enumerate(severity.values, 1):
             spec = severe(severity.fault, level, severity.profile or "car")
             assert getattr(spec, spec.strength) == value and not spec.is_off

@@ -277,7 +277,10 @@ def refused(done: Result, *parts: str) -> None:
         ),
         (["kitti:{data}/object", "--boxes", "network"], ("--boxes",)),
         (["overtake-approach", "--frames", "0-3"], ("--frames", "recorded")),
-        (["overtake-approach", "--faults", "lidar.beam_loss=50"], ("unknown fault", "lidar.beam_loss")),
+        (
+            ["overtake-approach", "--faults", "timing.stale_frames=2"],
+            ("unknown fault", "timing.stale_frames"),
+        ),
     ],
 )
 def test_a_bad_word_costs_one_sentence(

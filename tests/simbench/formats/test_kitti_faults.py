@@ -15,9 +15,11 @@ from hypothesis import strategies as st
 from fusion.camera import project_points
 from fusion.messages import Calibration, Detections, LidarScan
 from scenarios.fault_set import FaultSet
-from scenarios.recorded import ON_RECORDINGS, BeamLoss, parse_recorded_faults
+from scenarios.faults.lidar import BeamLoss
+from scenarios.recorded import ON_RECORDINGS, parse_recorded_faults
+from simbench.faults.points_lost import lost_rings
 from simbench.formats import recorded as made
-from simbench.formats.inject import DrawnOnRecording, draw_on_recording, lost_rings, moved_box
+from simbench.formats.inject import DrawnOnRecording, draw_on_recording, moved_box
 from simbench.formats.kitti import open_kitti
 from simbench.formats.proof import layers
 from simbench.formats.recorded import Player, Recorded
