@@ -29,7 +29,7 @@ from simbench.faults.receipt import Receipt, judge
 EXACT_PERCENT = 1e-3
 
 
-def share_percent(lost: list[Bool[np.ndarray, " n"]]) -> float:
+def share_percent(lost: list[Bool[np.ndarray, " _"]]) -> float:
     """How many of all points, in per cent."""
     return 100.0 * float(np.mean(np.concatenate(lost))) if sum(map(len, lost)) else 0.0
 
@@ -39,7 +39,7 @@ def share_percent(lost: list[Bool[np.ndarray, " n"]]) -> float:
 
 def drop(spec: Dropout, delivery: Delivery, site: Site) -> Acted:
     """Every point is lost with the same chance."""
-    drawn: list[Bool[np.ndarray, " n"]] = []
+    drawn: list[Bool[np.ndarray, " _"]] = []
 
     def change(sweep: Sweep) -> Sweep:
         lost = (
@@ -75,7 +75,7 @@ def drop_receipts(spec: Dropout, step: Step, site: Site) -> tuple[Receipt, ...]:
 
 def drop_weak(spec: WeakDropout, delivery: Delivery, site: Site) -> Acted:
     """The weaker a point, the sooner it is lost."""
-    drawn: dict[str, list[Bool[np.ndarray, " n"]]] = {"weak": [], "strong": []}
+    drawn: dict[str, list[Bool[np.ndarray, " _"]]] = {"weak": [], "strong": []}
 
     def change(sweep: Sweep) -> Sweep:
         above = (sweep.scan.intensity.astype(np.float64) - spec.middle) / spec.width

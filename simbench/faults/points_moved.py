@@ -19,6 +19,7 @@ from simbench.faults.firings import each, firing_of, moved, normal
 from simbench.faults.receipt import Receipt, judge, untouched
 
 NEAREST_M = 0.01
+FAR_SD = 6.0  # a ray of so many SD of the noise is never cut short
 RANGE_SD_CM = 1e-4  # of a mean or RMS over points: single precision at 100 m is 4e-4 cm a point
 TURN_SD_DEG = 1e-4  # single precision is 3e-6 deg a point
 POINT_RANGE_SD_CM = 1e-3
@@ -40,29 +41,31 @@ def _longer(sweep: Sweep, by_m: Float64[np.ndarray, " n"]) -> Sweep:
 
 def add_noise(spec: RangeNoise, delivery: Delivery, site: Site) -> Acted:
     """Independent of the sensor's own noise."""
-    drawn: list[Float64[np.ndarray, " n"]] = []
+    drawn: list[Float64[np.ndarray, " _"]] = []
 
     def change(sweep: Sweep) -> Sweep:
         e_m = 0.01 * spec.sd_cm * normal(site, spec.name, sweep.scan.seq)[firing_of(sweep, site.rig.lidar)]
-        drawn.append(e_m)
+        range_m = np.linalg.norm(sweep.scan.xyz_m.astype(np.float64), axis=1)
+        drawn.append(e_m[range_m > FAR_SD * 0.01 * spec.sd_cm])
         return _longer(sweep, e_m)
 
     after = each(delivery, change)
-    rms_m = np.sqrt(np.mean(np.concatenate(drawn) ** 2)) if drawn else 0.01 * spec.sd_cm
-    return Acted(delivery=after, realised={"rms_cm": 100.0 * float(rms_m)})
+    e_m = np.concatenate(drawn) if drawn else np.zeros(0)
+    rms_cm = 100.0 * float(np.sqrt(np.mean(e_m**2))) if len(e_m) else spec.sd_cm
+    return Acted(delivery=after, realised={"rms_cm": rms_cm})
 
 
 def noise_receipts(spec: RangeNoise, step: Step, site: Site) -> tuple[Receipt, ...]:
-    """RMS of what every range changed by."""
+    """RMS of what ranges changed by, of rays that are too long to be cut short at 1 cm."""
     both = compared(step)
-    change_cm = _range_change_cm(both)
+    change_cm = _range_change_cm(both, beyond_m=FAR_SD * 0.01 * spec.sd_cm)
     enough = len(change_cm) >= FEWEST
     return (
         judge(
             fault=spec.name, quantity="range noise (RMS)", unit="cm", requested=spec.sd_cm,
             realised=step.realised["rms_cm"],
             measured=float(np.sqrt(np.mean(change_cm**2))) if enough else None,
-            estimator_sd=RANGE_SD_CM + 1e-4 * spec.sd_cm,  # rays cut short at 1 cm
+            estimator_sd=RANGE_SD_CM,
             allowed=5.0 * spec.sd_cm / np.sqrt(2.0 * max(len(change_cm), 1)),
             note=RANGE_NOTE if enough else f"only {len(change_cm)} points",
         ),
@@ -82,16 +85,15 @@ def add_bias(spec: RangeBias, delivery: Delivery, site: Site) -> Acted:
 
 
 def bias_receipts(spec: RangeBias, step: Step, site: Site) -> tuple[Receipt, ...]:
-    """Median of what every range changed by, and that no range changed by anything else (but where a ray is
-    shorter than the bias).
+    """Median of what ranges changed by, and that none changed by anything else: of rays that are too long to
+    be cut short at 1 cm.
     """
     both = compared(step)
-    change_cm = _range_change_cm(both)
+    change_cm = _range_change_cm(both, beyond_m=0.02 - 0.01 * spec.bias_cm)
     enough = len(change_cm) >= FEWEST
     note = RANGE_NOTE if enough else f"only {len(change_cm)} points"
     middle = float(np.median(change_cm)) if enough else None
-    long = 100.0 * both.before.range_m[both.stays] + spec.bias_cm > 2.0
-    spread = float(np.std(change_cm[long])) if enough and len(long) == len(change_cm) else 0.0
+    spread = float(np.std(change_cm)) if enough else 0.0
     return (
         judge(
             fault=spec.name, quantity="range bias", unit="cm", requested=spec.bias_cm,
@@ -170,11 +172,14 @@ def turn_receipts(spec: AzimuthError, step: Step, site: Site) -> tuple[Receipt, 
 # -- estimators -------------------------------------------------------------------------------------------
 
 
-def _range_change_cm(both: Compared) -> Float64[np.ndarray, " k"]:
-    """Range less true range, after less before, of every point that is in both."""
+def _range_change_cm(both: Compared, beyond_m: float = 0.0) -> Float64[np.ndarray, " k"]:
+    """Range less true range, after less before, of every point that is in both and was farther than that."""
     before = (both.before.range_m - both.before.true_range_m)[both.stays]
     after = (both.after.range_m - both.after.true_range_m)[both.known]
-    return np.asarray(100.0 * (after - before)) if len(after) == len(before) else np.zeros(0)
+    if len(after) != len(before):
+        return np.zeros(0)
+    far = both.before.range_m[both.stays] > beyond_m
+    return np.asarray(100.0 * (after - before)[far])
 
 
 def _turned_deg(

@@ -13,14 +13,19 @@ import pytest
 
 from scenarios.faults import FaultSpec
 from scenarios.faults import lidar as specs
+from scenarios.load import load_sensor
+from scenarios.scenario import LidarSensor
 from scenarios.severity import severe
 from simbench.capture import Captured
 from simbench.faults.compared import compared
 from simbench.faults.deliver import DELIVERY_FAULTS, deliver
 from simbench.faults.delivery import Delivery, Sweep
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
+from simbench.faults.firings import firing_of
 from simbench.faults.points import DELIVERED
 from simbench.faults.receipt import MISMATCH, OK, UNVERIFIABLE, Receipt
+from simbench.run import run_case
+from simbench.sensors.beams import beam_table
 from tests.simbench.support import digest, faults, receipts_of, recorded, staged
 
 
@@ -278,7 +283,45 @@ def test_all_faults_together_are_recorded_and_ok() -> None:
     found = receipts_of(captured, at)
     assert {r.fault for r in found} == {spec.name for spec in together}
     assert MISMATCH not in statuses(found), [r for r in found if r.status == MISMATCH]
-    assert all(in_order(step) for step in captured.steps[-1].after.sweeps)
+    assert all(in_order(sweep) for sweep in captured.steps[-1].after.sweeps)
+    for case in (run_case(name, captured) for name in ("static_projection", "probabilistic")):
+        assert case.status == "ok", case.why
+        assert all(np.isfinite(row.value) if row.value is not None else row.why for row in case.rows)
+
+
+@pytest.mark.parametrize(
+    "spec",
+    [
+        specs.Dropout(percent=100.0),
+        specs.BeamLoss(percent=99.0),
+        specs.RangeNoise(sd_cm=100.0),
+        specs.RangeBias(bias_cm=-500.0),
+        specs.AzimuthError(offset_deg=-30.0, eccentricity_deg=10.0),
+        specs.DirtSector(width_deg=360.0),
+        specs.ReducedRange(lost_percent=99.0),
+        specs.Ghosts(percent=100.0, max_range_m=500.0),
+        specs.Fog(mor_m=0.25, backscatter=10.0),
+        specs.Rain(rate_mmph=300.0, backscatter=0.0),
+    ],
+    ids=lambda spec: spec.name,
+)
+def test_the_strongest_that_a_fault_allows_is_no_mismatch(spec: FaultSpec) -> None:
+    found = proof(spec, act(spec))
+    assert MISMATCH not in statuses(found), found
+
+
+@pytest.mark.parametrize("name", ["os1-64", "vlp-16"])
+def test_the_firing_of_a_point_is_found_by_its_offset_and_ring(name: str) -> None:
+    sensor = load_sensor(name)
+    assert isinstance(sensor, LidarSensor)
+    table = beam_table(sensor)
+    beams = np.tile(table.order, sensor.columns)
+    firing = np.repeat(np.arange(sensor.columns), len(table.order)) * len(table.order) + beams
+    like = clean().measured.sweeps[0]
+    rows = np.zeros(len(firing), dtype=np.int64)
+    full = like.keep(rows)
+    scan = replace(full.scan, ring=beams, offset_ns=table.fire_offset_ns.reshape(-1)[firing])
+    np.testing.assert_array_equal(firing_of(replace(full, scan=scan), sensor), firing)
 
 
 def test_a_weak_point_goes_before_a_strong_one() -> None:
