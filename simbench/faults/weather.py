@@ -35,7 +35,7 @@ def extinction_per_m(spec: Air) -> float:
     """alpha, in 1/m."""
     if isinstance(spec, Fog):
         return 3.912 / spec.mor_m if spec.mor_m > 0.0 else 0.0
-    return 1.076 * spec.rate_mmph**0.67 / (10.0 * np.log10(np.e)) * 1e-3
+    return float(1.076 * spec.rate_mmph**0.67 / (10.0 * np.log10(np.e)) * 1e-3)
 
 
 def weather(spec: Air, delivery: Delivery, site: Site) -> Acted:
