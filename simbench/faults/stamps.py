@@ -26,7 +26,7 @@ from scenarios.faults import (
 from scenarios.seeding import stream
 from simbench.faults import stamp_receipts
 from simbench.faults.chances import late_ns, queued_ns, scattered, spread_by_median
-from simbench.faults.delivery import Delivery
+from simbench.faults.delivery import Delivery, Shot, Sweep
 from simbench.faults.fault import Acted, DeliveryFault, Site
 from simbench.faults.flow import items, struck, true_ns, with_items
 from simbench.faults.receipt import Receipt
@@ -107,7 +107,8 @@ def _entry(
     def act(spec: FaultSpec, delivery: Delivery, site: Site) -> Acted:
         if spec.is_off:
             return Acted(delivery=delivery, realised={})
-        changed, realised = {}, {}
+        changed: dict[str, list[Sweep | Shot]] = {}
+        realised: dict[str, float] = {}
         for sensor in struck(spec, site.rig):
             now = items(delivery, site.rig, sensor)
             if not now:

@@ -89,7 +89,8 @@ def _entry(
     def act(spec: FaultSpec, delivery: Delivery, site: Site) -> Acted:
         if spec.is_off:
             return Acted(delivery=delivery, realised={})
-        changed, realised = {}, {}
+        changed: dict[str, Items] = {}
+        realised: dict[str, float] = {}
         for sensor in struck(spec, site.rig):
             now = items(delivery, site.rig, sensor)
             if not now:
