@@ -320,7 +320,8 @@ def test_the_firing_of_a_point_is_found_by_its_offset_and_ring(name: str) -> Non
     like = clean().measured.sweeps[0]
     rows = np.zeros(len(firing), dtype=np.int64)
     full = like.keep(rows)
-    scan = replace(full.scan, ring=beams, offset_ns=table.fire_offset_ns.reshape(-1)[firing])
+    offset_ns = table.fire_offset_ns.reshape(-1)[firing].astype(np.int32)
+    scan = replace(full.scan, ring=beams.astype(np.int16), offset_ns=offset_ns)
     np.testing.assert_array_equal(firing_of(replace(full, scan=scan), sensor), firing)
 
 
