@@ -82,8 +82,9 @@ class FalseBoxes(FaultSpec):
 class IdentitySwitches(FaultSpec):
     """The tracker confuses who is who, and stays confused.
 
-    In each frame of a camera with chance per_s / frame rate: two tracks that it has shown before and shows now
-    swap ids (mode swap), or one of them goes on under an id never used (mode fresh). Of the same camera only.
+    In each frame of a camera with chance per_s / frame rate: two tracks that it has shown before and shows
+    now swap ids (mode swap), or one of them goes on under an id never used (mode fresh). No id of another
+    camera moves.
     Unit: switches per second and camera. Source: judgement.
     """
 

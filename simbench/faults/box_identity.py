@@ -1,8 +1,8 @@
 """detector.identity_switches_per_s: the tracker takes one object for another, from then on.
 
 Per camera and frame three draws: whether, and which tracks. Only tracks that this camera has shown before and
-shows now can be confused. What they swap are ids: the box still is who it was. Receipt: changes of the id under
-which a camera shows what was one track.
+shows now can be confused. What they swap are ids: the box still is who it was. Receipt: changes of the id
+under which a camera shows what was one track.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def receipts(spec: Merged, step: Step, site: Site) -> tuple[Receipt, ...]:
     for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
         old, after = labelled(was), labelled(now)
         by_key = {(b.track_id, i): np.array(b.box_px) for b, i in after}
-        changed = 0
+        joins: set[int] = set()
         for k, m in _near_rows(was, spec.near_fraction):
             pairs += 1
             box = np.array([old[k][0].box_px, old[m][0].box_px])
@@ -115,10 +115,9 @@ def receipts(spec: Merged, step: Step, site: Site) -> tuple[Receipt, ...]:
             other = (old[small][0].track_id, old[small][1])
             if here is not None and other not in by_key and np.array_equal(here, hull):
                 joined += 1
-                changed += 2
-        spoiled += abs(len(old) - sum(item in after for item in old) - changed) + (
-            len(after) != len(old) - changed // 2
-        )
+                joins |= {k, m}
+        spoiled += sum(item not in after for k, item in enumerate(old) if k not in joins)
+        spoiled += len(after) != len(old) - len(joins) // 2
     return (
         judge_share(spec, "merged", spec.percent, step, joined, pairs, note=NOTE),
         *keeps_boxes(spec, step, spoiled, "neither themselves nor merged"),

@@ -14,8 +14,7 @@ from jaxtyping import Bool
 from scenarios.faults.reference import ReferenceLag, ReferenceOutage, ReferencePeriod
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
-from simbench.faults.fix_error import shown_s
-from simbench.faults.fixes import NO_REFERENCE, adds_up, own_period_s, unverifiable
+from simbench.faults.fixes import NO_REFERENCE, adds_up, own_period_s, shown_s, unverifiable
 from simbench.faults.receipt import Receipt, judge
 from simbench.truth import GnssReference
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -10,9 +11,11 @@ from jaxtyping import Float64, Int64
 from scenarios.faults import FaultSpec
 from simbench.faults.fault import Step
 from simbench.faults.receipt import Receipt, judge, untouched
+from simbench.motion import Motion
 from simbench.truth import GnssReference
 
 EXACT_M = 1e-9  # of a difference of two stored positions
+SAME_M = 0.05  # a centre that is this near to an object's is that object's
 NO_REFERENCE = "this run has no GNSS reference"
 PARTS_NOTE = "position less centre, lever, heading and noise"
 
@@ -65,3 +68,25 @@ def adds_up(spec: FaultSpec, step: Step) -> tuple[Receipt, ...]:
         found=((off_m, EXACT_M), (moved_m, EXACT_M)),
         note=PARTS_NOTE,
     )
+
+
+def shown_s(reference: GnssReference, at_s: float, duration_s: float) -> float:
+    """How much of a stretch of time lies within the fixes of a run."""
+    first_s, last_s = float(reference.fix_ns[0]) * 1e-9, float(reference.fix_ns[-1]) * 1e-9
+    end_s = min(at_s + duration_s, last_s + own_period_s(reference))
+    return max(end_s - max(at_s, first_s), 0.0)
+
+
+def carrier(
+    of: Literal["target", "ego"], reference: GnssReference, motion: Motion
+) -> Float64[np.ndarray, "m 3 3"]:
+    """Attitude in the world of who carries the antenna, at each fix."""
+    if of == "ego":
+        return np.asarray(motion.shaken_ego(reference.fix_ns)[0])
+    R_ego, p_ego = motion.ego(reference.fix_ns)
+    centre_m = p_ego + np.einsum("nij,nj->ni", R_ego, reference.centre_ego_m)
+    for info in motion.world.objects:
+        R_object, p_object = motion.object_centre(info.object_id, reference.fix_ns)
+        if np.all(np.abs(p_object - centre_m) < SAME_M):
+            return np.asarray(R_object)
+    raise ValueError("the reference's centre is no object's")

@@ -24,7 +24,7 @@ from simbench.sensors.detector import draw_track_ids
 from simbench.truth import ImageTruth, ObjectInfo
 from tests.simbench.support import staged
 
-OTHERS = 12
+OTHERS = 7
 FRAMES = 40
 PERIOD_NS = 100_000_000
 
