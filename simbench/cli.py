@@ -515,11 +515,8 @@ def list_(kind: str) -> None:
         lines = [(metric.name, metric.definition) for metric in METRICS]
     elif kind == "faults":
         from scenarios.fault_set import describe_faults
-        from scenarios.recorded import ONLY_RECORDED
 
         lines = [(str(f["name"]), str(f["summary"])) for f in describe_faults()]
-        for fault in ONLY_RECORDED.values():
-            lines.append((fault.name, f"{(fault.__doc__ or '').partition(chr(10))[0]} (recorded data only)"))
     elif kind == "scenarios":
         from scenarios.load import list_scenarios, load_scenario
 

@@ -10,7 +10,14 @@ One file a family, named as the first word of its faults' names.
 from __future__ import annotations
 
 from scenarios.faults import calibration, camera, detector, lidar, motion, reference, timing
-from scenarios.faults.calibration import CalibrationRotation
+from scenarios.faults.calibration import (
+    CalibrationMixup,
+    CalibrationRotation,
+    CalibrationTranslation,
+    ClickNoise,
+    FocalLength,
+    PixelShift,
+)
 from scenarios.faults.detector import EdgeError
 from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
 from scenarios.faults.spec import Cameras, FaultSpec, Sensors
@@ -34,8 +41,11 @@ from scenarios.faults.timing import (
 __all__ = [
     "FAMILIES",
     "FAULTS",
+    "CalibrationMixup",
     "CalibrationRotation",
+    "CalibrationTranslation",
     "Cameras",
+    "ClickNoise",
     "ClockDrift",
     "ClockOffset",
     "Dropped",
@@ -43,8 +53,10 @@ __all__ = [
     "EdgeError",
     "FaultSpec",
     "Flex",
+    "FocalLength",
     "Frozen",
     "Latency",
+    "PixelShift",
     "Reordered",
     "RoadEvent",
     "RoadShake",

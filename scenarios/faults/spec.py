@@ -16,6 +16,7 @@ Cameras = Literal["cameras"] | tuple[Name, ...]
 Sensors = Literal["cameras", "lidar"] | tuple[Name, ...]
 """All cameras of the rig, its LiDAR (whatever its name), or some cameras by their names."""
 
+
 Level = float | str | Mapping[str, float | str]
 """A fault's strength, or values of several of its fields."""
 

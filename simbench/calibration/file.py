@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -127,4 +128,21 @@ def told(given: Calibration, true: Calibration, found: Calibration) -> Calibrati
         name: found.T_ego_sensor[name] @ (true.T_ego_sensor[name].inverse() @ pose)
         for name, pose in given.T_ego_sensor.items()
     }
-    return Calibration(T_ego_sensor=poses, cameras=found.cameras)
+    cameras = {
+        name: _retold(lens, true.cameras[name], given.cameras[name]) for name, lens in found.cameras.items()
+    }
+    return Calibration(T_ego_sensor=poses, cameras=cameras)
+
+
+def _retold(found: PinholeCamera, true: PinholeCamera, given: PinholeCamera) -> PinholeCamera:
+    """The found intrinsics with what a fault did to the true ones; as they are where it did nothing."""
+    if given == true:
+        return found
+    return replace(
+        found,
+        fx_px=found.fx_px * given.fx_px / true.fx_px,
+        fy_px=found.fy_px * given.fy_px / true.fy_px,
+        cx_px=found.cx_px + given.cx_px - true.cx_px,
+        cy_px=found.cy_px + given.cy_px - true.cy_px,
+        distortion=found.distortion if given.distortion == true.distortion else given.distortion,
+    )

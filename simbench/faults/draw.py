@@ -10,15 +10,16 @@ from jaxtyping import Float64, Int64
 
 from fusion.messages import Calibration
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, Flex, RoadShake, TriggerOffset, Vibration
+from scenarios.faults import EdgeError, Flex, RoadShake, TriggerOffset, Vibration
 from scenarios.scenario import System
 from scenarios.severity import Profile
 from simbench.dynamics.ride import Ride
-from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
 from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
+from simbench.faults.tell import tell
+from simbench.faults.telling import Place, Telling
 from simbench.sensors.clock import CameraTiming
 from simbench.sensors.rig import SensorRig
 from simbench.shake import Shake
@@ -27,7 +28,9 @@ from simbench.world import World
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Drawn:
-    """What this seed drew for each fault: the *realised* side of the receipts."""
+    """What this seed drew for each fault: the *realised* side of the receipts. `told`: what the fusion is
+    told in the end; `tellings`: what each fault made of it, one by one.
+    """
 
     profile: Profile
     body_shake: Shake | Ride | None
@@ -35,11 +38,17 @@ class Drawn:
     delays_ns: Mapping[str, Int64[np.ndarray, " f"]]
     edge_errors: Mapping[str, Mapping[int, Float64[np.ndarray, "f 4"]]]
     told: Calibration
+    tellings: tuple[Telling, ...]
 
 
-def struck(spec: TriggerOffset | Flex | CalibrationRotation, rig: SensorRig) -> tuple[str, ...]:
+def struck(spec: TriggerOffset | Flex, rig: SensorRig) -> tuple[str, ...]:
     """The cameras that a fault acts on."""
     return spec.named_cameras or tuple(rig.cameras)
+
+
+def place_of(rig: SensorRig, seed: int) -> Place:
+    """Where the calibration of a rig is told."""
+    return Place(true=rig.calibration, lidar=rig.lidar_name, seed=seed)
 
 
 def draw(
@@ -52,14 +61,12 @@ def draw(
 ) -> Drawn:
     """Draw every fault from its own stream; none moves another's numbers."""
     duration_s = system.duration_s
-    vibration, rotation, road = faults.get(Vibration), faults.get(CalibrationRotation), faults.get(RoadShake)
+    vibration, road = faults.get(Vibration), faults.get(RoadShake)
     offset, bend, edge_error = faults.get(TriggerOffset), faults.get(Flex), faults.get(EdgeError)
     profile: Profile = "car" if rig.rig.body == "vehicle" else "rider"
     if vibration is not None and vibration.profile != "auto":
         profile = vibration.profile
-    told = rig.calibration
-    if rotation is not None:
-        told = calibration_fault.miscalibrate(told, rotation, struck(rotation, rig), seed)
+    told, tellings = tell(faults, place_of(rig, seed))
     delays, flex, edges = {}, {}, {}
     if offset is not None:
         for name in struck(offset, rig):
@@ -86,6 +93,7 @@ def draw(
         delays_ns=delays,
         edge_errors=edges,
         told=told,
+        tellings=tellings,
     )
 
 

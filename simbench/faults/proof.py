@@ -7,18 +7,19 @@ import numpy as np
 from fusion.camera import project_points
 from fusion.geometry import rotation_log
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, Flex, RoadShake, TriggerOffset, Vibration
+from scenarios.faults import EdgeError, Flex, RoadShake, TriggerOffset, Vibration
 from simbench.capture import Captured
 from simbench.dynamics.ride import Ride
-from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
 from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
 from simbench.faults.deliver import DELIVERY_FAULTS
-from simbench.faults.draw import struck
+from simbench.faults.draw import place_of, struck
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.receipt import Receipt
+from simbench.faults.tell import told_receipts
+from simbench.faults.telling import Witness
 from simbench.sensors import fiducials
 from simbench.sensors.rig import SensorRig
 from simbench.shake import Shake
@@ -41,11 +42,8 @@ def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: f
         result += road_fault.road_receipts(road, driven, duration_s, body, evidence)
     if (bend := faults.get(Flex)) is not None:
         result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
-    if (rotation := faults.get(CalibrationRotation)) is not None:
-        told = captured.recording.calibration
-        result += calibration_fault.receipts(
-            rotation, struck(rotation, rig), rig.calibration, drawn.told, told, evidence, body
-        )
+    witness = Witness(place=place_of(rig, captured.site.seed), evidence=evidence, body=body)
+    result += told_receipts(faults, drawn.tellings, captured.recording.calibration, witness)
     if (edge_error := faults.get(EdgeError)) is not None:
         sizes = {name: (c.width_px, c.height_px) for name, c in rig.pinholes.items()}
         period_s = {1.0 / camera.rate_hz for camera in rig.cameras.values()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int64
@@ -12,13 +12,13 @@ from fusion.geometry import readonly
 from fusion.messages import BoxPx, Calibration
 from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, StaleFrames
+from scenarios.faults import EdgeError, StaleFrames
 from scenarios.faults.lidar import BeamLoss
-from scenarios.recorded import PixelShift
-from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults.points_lost import lost_rings
-from simbench.formats.calibration import CAMERA
+from simbench.faults.tell import tell
+from simbench.faults.telling import Place, Telling
+from simbench.formats.calibration import CAMERA, LIDAR
 from simbench.truth import ObjectInfo
 
 SMALLEST_PX = 1.0  # along a side of a delivered box
@@ -31,6 +31,7 @@ class DrawnOnRecording:
     """
 
     told: Calibration
+    tellings: tuple[Telling, ...]
     stale_frames: int
     rings: int
     lost_rings: Int64[np.ndarray, " r"]
@@ -63,19 +64,14 @@ def draw_on_recording(
     seed: int,
 ) -> DrawnOnRecording:
     """frames, rings: how many the recording has (rings: 0 where they were not looked for)."""
-    told = true
-    if (rotation := faults.get(CalibrationRotation)) is not None:
-        told = calibration_fault.miscalibrate(told, rotation, (CAMERA,), seed)
-    if (shift := faults.get(PixelShift)) is not None:
-        camera = told.cameras[CAMERA]
-        shifted = replace(camera, cx_px=camera.cx_px + shift.right_px, cy_px=camera.cy_px + shift.down_px)
-        told = Calibration(T_ego_sensor=told.T_ego_sensor, cameras={**told.cameras, CAMERA: shifted})
+    told, tellings = tell(faults, Place(true=true, lidar=LIDAR, seed=seed))
     edges: dict[int, Float64[np.ndarray, "f 4"]] = {}
     if (error := faults.get(EdgeError)) is not None:
         edges = detector_fault.edge_errors(error, CAMERA, objects, frames, period_s, seed)
     stale, loss = faults.get(StaleFrames), faults.get(BeamLoss)
     return DrawnOnRecording(
         told=told,
+        tellings=tellings,
         stale_frames=0 if stale is None else stale.frames,
         rings=rings,
         lost_rings=lost_rings(loss, rings, seed) if loss is not None and rings else _NONE,

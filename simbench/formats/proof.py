@@ -1,7 +1,6 @@
 """Receipts of the faults in recorded data: what the delivered data itself says, by its own means.
 
-calibration.rotation_deg  known points in the camera's view and PnP, as for a simulated drive
-calibration.shift_px      the same points projected by OpenCV with what the fusion is told
+calibration.*             known points in the camera's view and PnP, as for a simulated drive
 detector.edge_error       delivered against labelled boxes, as for a simulated drive
 timing.stale_frames       how many frames before the labelled boxes fit the delivered ones best
 lidar.beam_loss           layers of elevation in narrow sectors of the first sweep, delivered against file
@@ -11,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import cv2
 import numpy as np
 from jaxtyping import Float32, Float64
 
@@ -19,14 +17,14 @@ from fusion.camera import project_points
 from fusion.geometry import rotation_log
 from fusion.messages import Detections, LidarScan
 from scenarios.fault_set import FaultSet
-from scenarios.faults import CalibrationRotation, EdgeError, StaleFrames
+from scenarios.faults import EdgeError, StaleFrames
 from scenarios.faults.lidar import BeamLoss
-from scenarios.recorded import PixelShift
-from simbench.faults import calibration as calibration_fault
 from simbench.faults import detector as detector_fault
 from simbench.faults.estimate import CameraEvidence, camera_pose
 from simbench.faults.receipt import Receipt, judge
-from simbench.formats.calibration import CAMERA
+from simbench.faults.tell import asks_to_tell, told_receipts
+from simbench.faults.telling import Place, Witness
+from simbench.formats.calibration import CAMERA, LIDAR
 from simbench.formats.inject import DrawnOnRecording
 from simbench.formats.kitti import Drive
 from simbench.recording import Recording
@@ -36,7 +34,6 @@ from simbench.truth import ImageTruth
 SECTORS = 720
 LAYER_DEG = 0.08
 LAYERS_SD = 1.5  # per cent: of 120 random losses on three full sweeps, SD 0.8 and bias -0.9
-SHIFT_SD_PX = 1e-3
 STALE_SD = 0.05
 CLEARLY = 0.5  # the best fit of boxes must be better than this share of the next best
 
@@ -53,13 +50,11 @@ def recorded_receipts(
     file holds it, where beams are lost.
     """
     truth, result = recording.truth, list[Receipt]()
-    if (rotation := faults.get(CalibrationRotation)) is not None:
-        evidence = (_evidence(recording),) if truth.images else ()
-        result += calibration_fault.receipts(
-            rotation, (CAMERA,), truth.calibration, drawn.told, recording.calibration, evidence, None
-        )
-    if (shift := faults.get(PixelShift)) is not None:
-        result += _shifted(shift, recording)
+    evidence = (_evidence(recording),) if truth.images and asks_to_tell(faults) else ()
+    # What was drawn needs no seed any more.
+    place = Place(true=truth.calibration, lidar=LIDAR, seed=0)
+    witness = Witness(place=place, evidence=evidence, body=None)
+    result += told_receipts(faults, drawn.tellings, recording.calibration, witness)
     detections = [m for m in recording.messages if isinstance(m, Detections)]
     if (error := faults.get(EdgeError)) is not None:
         camera = truth.calibration.cameras[CAMERA]
@@ -99,27 +94,6 @@ def _evidence(recording: Recording) -> CameraEvidence:
         pivot_ego_m=np.zeros(3),
         speed_mps=np.zeros(n),
     )
-
-
-def _shifted(spec: PixelShift, recording: Recording) -> tuple[Receipt, ...]:
-    true, told = recording.truth.calibration.cameras[CAMERA], recording.calibration.cameras[CAMERA]
-    T_ego_camera = recording.truth.calibration.T_ego_sensor[CAMERA]
-    known = fiducials.points_m(true, T_ego_camera)
-    uv = project_points(known, T_ego_camera.inverse(), true)
-    in_camera = T_ego_camera.inverse().apply(known)
-    seen, _ = cv2.projectPoints(in_camera, np.zeros(3), np.zeros(3), told.matrix, np.zeros(5))
-    measured = (seen[:, 0] - uv).mean(axis=0)
-    realised = (told.cx_px - true.cx_px, told.cy_px - true.cy_px)
-    requested = (spec.right_px, spec.down_px)
-    return tuple(
-        judge(
-            fault=spec.name, quantity=f"{CAMERA} {side}", unit="px", requested=requested[i],
-            realised=realised[i], measured=float(measured[i]), estimator_sd=SHIFT_SD_PX, allowed=1e-6,
-            note="known points by the told camera",
-        )
-        for i, side in enumerate(("right", "down"))
-        if requested[i] != 0.0 or abs(realised[i]) > 0.0
-    )  # fmt: skip
 
 
 def _stale(

@@ -23,10 +23,12 @@ if __name__ == "__main__":
 
 import numpy as np
 
+from scenarios.fault_set import FaultSet
 from scenarios.faults import CalibrationRotation
 from simbench.case import Job
 from simbench.drive import drive
-from simbench.faults.calibration import miscalibrate
+from simbench.faults.draw import place_of
+from simbench.faults.tell import tell
 from simbench.plugins import load_pipeline
 from simbench.recording import Recording
 from simbench.score.frames import frames_of
@@ -75,8 +77,8 @@ def drive_rates(job: Job) -> Mapping[Cell, Rates]:
         told = true
         if angle_deg:
             spec = CalibrationRotation.model_validate({"angle_deg": angle_deg, "axis": axis})
-            cameras = tuple(staged.rig.cameras)
-            told = replace(true, calibration=miscalibrate(true.calibration, spec, cameras, job.seed))
+            calibration, _ = tell(FaultSet(specs=(spec,)), place_of(staged.rig, job.seed))
+            told = replace(true, calibration=calibration)
         for pipeline in (*OURS, *RIVALS) if angle_deg == 0.0 else OURS:
             found[(job.scenario, job.system, axis, angle_deg, pipeline)] = rates(told, pipeline)
     return found

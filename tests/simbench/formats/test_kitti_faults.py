@@ -113,6 +113,10 @@ def test_box_errors_move_the_delivered_boxes_only(sequence: Path) -> None:
 ZERO = (
     "calibration.shift_px=0",
     "calibration.rotation_deg=0",
+    "calibration.translation_cm=0",
+    "calibration.focal_percent=0",
+    "calibration.click_noise_px=0",
+    "calibration.mixup=none",
     "timing.stale_frames=0",
     "lidar.beam_loss=0",
     "detector.edge_error={sd_fraction: 0, bias_fraction: 0}",
@@ -127,6 +131,10 @@ def test_a_fault_of_zero_strength_is_none(word: str) -> None:
 STRONG = (
     "calibration.shift_px=6",
     "calibration.rotation_deg=1",
+    "calibration.translation_cm={shift_cm: 10, sensors: lidar}",
+    "calibration.focal_percent=2",
+    "calibration.click_noise_px=2",
+    "calibration.mixup=inverse",
     "timing.stale_frames=1",
     "lidar.beam_loss=50",
     "detector.edge_error=0.05",
