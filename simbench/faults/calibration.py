@@ -70,11 +70,12 @@ def receipts(spec: CalibrationRotation, step: Telling, witness: Witness) -> tupl
     others: list[tuple[float, float]] = []
     for sensor in (*witness.place.cameras, witness.place.lidar):
         drawn_deg = np.array([step.realised.get(f"{sensor} {name}", 0.0) for name in AXES])
-        excess_deg, sd_deg = _excess_deg(sensor, drawn_deg, step, seen, witness)
         if sensor in spared(spec, witness.place):
-            others.append((float(np.linalg.norm(excess_deg)), sd_deg))
+            turn_deg, sd_deg = _excess_deg(sensor, np.zeros(3), step, seen, witness)
+            others.append((float(np.linalg.norm(turn_deg)), sd_deg))
         if sensor not in struck(spec, witness.place):
             continue
+        excess_deg, sd_deg = _excess_deg(sensor, drawn_deg, step, seen, witness)
         size_deg = float(np.linalg.norm(drawn_deg))
         if spec.axis != "random":
             axis = np.array(AXES[spec.axis])

@@ -67,8 +67,13 @@ def proof(
     return told_receipts(faults(*specs), tellings, told, witness)
 
 
+@cache
+def made(*specs: FaultSpec, seed: int = 0) -> tuple[Calibration, tuple[Telling, ...]]:
+    return tell(faults(*specs), place(seed))
+
+
 def clean(*specs: FaultSpec, seed: int = 0) -> tuple[Receipt, ...]:
-    return proof(*tell(faults(*specs), place(seed)), *specs, seed=seed)
+    return proof(*made(*specs, seed=seed), *specs, seed=seed)
 
 
 def statuses(found: tuple[Receipt, ...]) -> set[str]:
@@ -111,7 +116,7 @@ def test_inputs_stay_and_a_seed_repeats(which: str) -> None:
 def test_a_clean_draw_is_ok_and_stays_a_rotation(which: str, seed: int) -> None:
     found = clean(SPECS[which], seed=seed)
     assert found and statuses(found) == {OK}, found
-    for pose in tell(faults(SPECS[which]), place(seed))[0].T_ego_sensor.values():
+    for pose in made(SPECS[which], seed=seed)[0].T_ego_sensor.values():
         np.testing.assert_allclose(pose.rotation @ pose.rotation.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(pose.rotation) == pytest.approx(1.0)
 
@@ -175,7 +180,7 @@ FACTORS = {
 @pytest.mark.parametrize("which", SPECS)
 def test_what_is_told_otherwise_than_drawn_is_caught(which: str, mutant: str) -> None:
     spec = SPECS[which]
-    told, tellings = tell(faults(spec), place())
+    told, tellings = made(spec)
     if isinstance(spec, FocalLength) and abs(FACTORS[mutant]) > 10.0:
         pytest.skip("no lens of negative focal length can be told")
     wrong = scaled(told, FACTORS[mutant])
@@ -188,13 +193,13 @@ def test_a_draw_of_another_size_is_caught(which: str, by: float) -> None:
     """The injector reads another strength than was asked for, and says truly what it drew."""
     spec = SPECS[which]
     other = spec.model_copy(update={field: by * getattr(spec, field) for field in spec.zero_when_off})
-    assert MISMATCH in statuses(proof(*tell(faults(other), place()), spec))
+    assert MISMATCH in statuses(proof(*made(other), spec))
 
 
 @pytest.mark.parametrize("which", SPECS)
 def test_applied_twice_is_caught(which: str) -> None:
     spec, (entry,) = SPECS[which], [f for f in CALIBRATION_FAULTS if f.spec is type(SPECS[which])]
-    once, tellings = tell(faults(spec), place())
+    once, tellings = made(spec)
     twice = entry.tell(spec, once, place()).calibration
     assert MISMATCH in statuses(proof(twice, tellings, spec))
 
@@ -208,9 +213,9 @@ def test_an_injector_replaced_by_the_identity_is_caught(which: str) -> None:
 @pytest.mark.parametrize("which", [w for w, s in SPECS.items() if getattr(s, "sensors", "") == (FRONT,)])
 def test_the_wrong_sensor_is_caught(which: str) -> None:
     spec = SPECS[which]
-    _, tellings = tell(faults(spec), place())
+    _, tellings = made(spec)
     for sensors in ((BACK,), "cameras"):
-        told, others = tell(faults(spec.model_copy(update={"sensors": sensors})), place())
+        told, others = made(spec.model_copy(update={"sensors": sensors}))
         found = proof(told, tellings, spec)
         assert any(r.status == MISMATCH and "other" in r.quantity for r in found), found
     assert MISMATCH in statuses(proof(told, others, spec))
@@ -219,7 +224,7 @@ def test_the_wrong_sensor_is_caught(which: str) -> None:
 @pytest.mark.parametrize("which", ["rotation of the lidar", "translation of the lidar"])
 def test_cameras_for_the_lidar_are_caught(which: str) -> None:
     spec = SPECS[which]
-    told, tellings = tell(faults(spec.model_copy(update={"sensors": "cameras"})), place())
+    told, tellings = made(spec.model_copy(update={"sensors": "cameras"}))
     assert len([r for r in proof(told, tellings, spec) if r.status == MISMATCH]) == 2
 
 
@@ -229,7 +234,7 @@ def test_a_mixup_for_another_is_caught(what: str) -> None:
     for other in MIXED:
         if other != what:
             wrong = SPECS[other].model_copy(update={"sensors": getattr(spec, "sensors", "cameras")})
-            told, tellings = tell(faults(wrong), place())
+            told, tellings = made(wrong)
             assert MISMATCH in statuses(proof(told, tellings, spec)), other
 
 
@@ -255,7 +260,7 @@ def test_all_of_them_compose_and_each_measures_its_own_step(seed: int) -> None:
 @pytest.mark.parametrize("spec", TOGETHER, ids=lambda spec: spec.name)
 def test_one_that_is_left_out_among_others_is_caught(spec: FaultSpec) -> None:
     rest = tuple(s for s in TOGETHER if s is not spec)
-    found = proof(*tell(faults(*rest), place()), *TOGETHER)
+    found = proof(*made(*rest), *TOGETHER)
     assert spec.name in {r.fault for r in found if r.status == MISMATCH}
 
 
@@ -322,7 +327,7 @@ def test_the_strongest_is_no_mismatch(spec: FaultSpec) -> None:
 
 def test_more_clicks_find_a_better_pose() -> None:
     def error(boards: int) -> float:
-        told, _ = tell(faults(ClickNoise(noise_px=2.0, boards=boards)), place())
+        told, _ = made(ClickNoise(noise_px=2.0, boards=boards))
         true = place().true
         turns = [_turn(true.T_ego_sensor[name], told.T_ego_sensor[name]) for name in true.cameras]
         return float(np.mean([np.linalg.norm(turn) for turn in turns]))
@@ -360,7 +365,7 @@ def test_a_found_calibration_keeps_what_a_fault_did_to_the_intrinsics() -> None:
         cameras={n: replace(c, fx_px=1.01 * c.fx_px, cx_px=c.cx_px + 2.0) for n, c in true.cameras.items()},
     )
     assert digest(on_found(true, true, found)) == digest(found)
-    given, _ = tell(faults(SPECS["focal"], SPECS["shift"]), place())
+    given, _ = made(SPECS["focal"], SPECS["shift"])
     lens = on_found(given, true, found).cameras[FRONT]
     assert lens.fx_px == pytest.approx(1.02 * 1.01 * true.cameras[FRONT].fx_px)
     assert lens.cx_px == pytest.approx(true.cameras[FRONT].cx_px + 8.0)
