@@ -529,8 +529,9 @@ def list_(kind: str) -> None:
         from scenarios.load import list_sensors, load_sensor
 
         lines = [(name, load_sensor(name).kind) for name in list_sensors()]
+    width = max([28, *(len(name) for name, _ in lines)])
     for name, text in lines:
-        click.echo(f"{name:28s} {text}".rstrip())
+        click.echo(f"{name:{width}s} {text}".rstrip())
 
 
 @main.command()

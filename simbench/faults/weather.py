@@ -1,6 +1,6 @@
 """lidar.fog_mor_m, lidar.rain_mmph: what hangs in the air weakens every echo and sends some of its own back.
 
-Extinction alpha: fog 3.912 / MOR (Koschmieder); rain 1.076 R^0.67 dB/km (ITU-R P.1814). Power falls by
+Extinction alpha: fog ln(20) / MOR (WMO: 5 % of the light is left); rain 1.076 R^0.67 dB/km (ITU-R P.1814). Power falls by
 exp(-2 alpha r); a point is lost with the chance that the sensor's own range law gives. A firing meets the air
 itself with probability 1 - exp(-backscatter alpha 10 m), at depth -3 m ln(u) beyond the minimum range, and
 returns that if it is nearer than what it hit. Simplified: see the specs. Receipts: extinction by how
@@ -27,6 +27,7 @@ Air = Fog | Rain
 DEPTH_M = 3.0  # mean depth of an echo of the air [judgement]
 NEAR_ZONE_M = 10.0  # where it is met at all [judgement]
 FAINTEST, BRIGHTEST = 0.01, 0.05  # its intensity, drawn evenly [judgement]
+FOG = float(np.log(20.0))  # alpha times the optical range
 EXTINCTION_SD_PER_KM = 2e-3
 FEWEST = 100
 
@@ -34,7 +35,7 @@ FEWEST = 100
 def extinction_per_m(spec: Air) -> float:
     """alpha, in 1/m."""
     if isinstance(spec, Fog):
-        return 3.912 / spec.mor_m if spec.mor_m > 0.0 else 0.0
+        return FOG / spec.mor_m if spec.mor_m > 0.0 else 0.0
     return float(1.076 * spec.rate_mmph**0.67 / (10.0 * np.log10(np.e)) * 1e-3)
 
 
@@ -126,7 +127,7 @@ def weather_receipts(
 
 def _fog_receipts(spec: Fog, step: Step, site: Site) -> tuple[Receipt, ...]:
     # Koschmieder: over one optical range, contrast falls to 2 %.
-    return weather_receipts(spec, step, site, lambda s: -1000.0 * float(np.log(0.02)) / s.mor_m)
+    return weather_receipts(spec, step, site, lambda s: -1000.0 * float(np.log(0.05)) / s.mor_m)
 
 
 def _rain_receipts(spec: Rain, step: Step, site: Site) -> tuple[Receipt, ...]:
