@@ -167,10 +167,10 @@ class Fog(FaultSpec):
     """Fog of a meteorological optical range weakens every echo, and sends some of its own back.
 
     Extinction alpha = ln(20) / mor_m = 2.996 / mor_m: the optical range is where 5 % of the light is left
-    (WMO; visibility at 2 % contrast, Koschmieder's 3.912 / V, is 1.3 times as far). Power falls by exp(-2 alpha r); a point is lost when that,
-    times its intensity, is too weak for the sensor at its range r. Each firing meets the fog itself with
-    probability 1 - exp(-backscatter * alpha * 10 m), at an exponential depth of mean 3 m, and returns that
-    if it is nearer. 0 means no fog; the less, the denser.
+    (WMO; visibility at 2 % contrast, Koschmieder's 3.912 / V, is 1.3 times as far). Power falls by
+    exp(-2 alpha r); a point is lost when that, times its intensity, is too weak for the sensor at its range
+    r. Each firing meets the fog itself with probability 1 - exp(-backscatter * alpha * 10 m), at an
+    exponential depth of mean 3 m, and returns that if it is nearer. 0 means no fog; the less, the denser.
     Unit: metres. Source: attenuation as in Hahner et al., ICCV 2021; simplified: their fog echo is worked
     out from the pulse, here its rate and depth are judgement, and weak echoes get no noisier.
     """

@@ -1,8 +1,9 @@
 """lidar.fog_mor_m, lidar.rain_mmph: what hangs in the air weakens every echo and sends some of its own back.
 
-Extinction alpha: fog ln(20) / MOR (WMO: 5 % of the light is left); rain 1.076 R^0.67 dB/km (ITU-R P.1814). Power falls by
-exp(-2 alpha r); a point is lost with the chance that the sensor's own range law gives. A firing meets the air
-itself with probability 1 - exp(-backscatter alpha 10 m), at depth -3 m ln(u) beyond the minimum range, and
+Extinction alpha: fog ln(20) / MOR (WMO: 5 % of the light is left); rain 1.076 R^0.67 dB/km (ITU-R P.1814).
+Power falls by exp(-2 alpha r); a point is lost with the chance that the sensor's own range law gives. A
+firing meets the air itself with probability 1 - exp(-backscatter alpha 10 m), at depth -3 m ln(u) beyond the
+minimum range, and
 returns that if it is nearer than what it hit. Simplified: see the specs. Receipts: extinction by how
 intensities fall with range; losses and new false points counted, against what is expected of these points.
 """
