@@ -256,8 +256,14 @@ def refused(done: Result, *parts: str) -> None:
         (["kitti:{data}/object", "--system", "wearable"], ("'wearable'", "allowed: car")),
         (["kitti:{data}/object", "--size", "320x200"], ("--size",)),
         (["kitti:{data}/object", "kitti:{data}/tracking"], ("one kitti: folder",)),
-        (["kitti:{data}/object", "--faults", "motion.flex_deg=1"], ("motion.flex_deg", "has happened")),
-        (["kitti:{data}/object", "--faults", "demo"], ("motion.vibration_deg", "has happened")),
+        (
+            ["kitti:{data}/object", "--faults", "motion.flex_deg=1"],
+            ("motion.flex_deg", "does not act on recorded data"),
+        ),
+        (
+            ["kitti:{data}/object", "--faults", "demo"],
+            ("motion.vibration_deg", "does not act on recorded data"),
+        ),
         (["kitti:{data}/object", "--faults", "lidar.beam_los=5"], ("did you mean 'lidar.beam_loss'?",)),
         (["kitti:{data}/object", "--faults", "timing.stale_frames=1"], ("has 1 frame", "stale_frames")),
         (["kitti:{data}/tracking", "--faults", "timing.stale_frames=3"], ("has 3 frames", "stale_frames")),
@@ -277,10 +283,7 @@ def refused(done: Result, *parts: str) -> None:
         ),
         (["kitti:{data}/object", "--boxes", "network"], ("--boxes",)),
         (["overtake-approach", "--frames", "0-3"], ("--frames", "recorded")),
-        (
-            ["overtake-approach", "--faults", "timing.stale_frames=2"],
-            ("unknown fault", "timing.stale_frames"),
-        ),
+        (["kitti:{data}/object", "--set", "road.width_m=40"], ("--set", "simulated")),
     ],
 )
 def test_a_bad_word_costs_one_sentence(

@@ -305,7 +305,7 @@ def test_an_injector_that_does_nothing_is_a_mismatch(crowd: Path, word: str) -> 
 
     with mock.patch.object(made, "recorded_receipts", of_clean):
         found = play(crowd, word)
-    assert {r.status for r in found.receipts} == {"mismatch"}, found.receipts
+    assert "mismatch" in {r.status for r in found.receipts}, found.receipts
 
 
 def test_boxes_that_stand_still_cannot_tell_how_old_they_are(tmp_path: Path) -> None:
