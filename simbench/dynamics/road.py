@@ -172,7 +172,7 @@ def rolled_over(height_m: Float64[np.ndarray, " n"], radius_m: float) -> Float64
     reach = min(int(radius_m / STEP_M), MARGIN)
     path = height_m.copy()
     for k in range(1, reach + 1):
-        drop = radius_m - np.sqrt(radius_m**2 - (k * STEP_M) ** 2)
+        drop = radius_m - np.sqrt(max(radius_m**2 - (k * STEP_M) ** 2, 0.0))  # rounding may pass the rim
         path[:-k] = np.maximum(path[:-k], height_m[k:] - drop)
         path[k:] = np.maximum(path[k:], height_m[:-k] - drop)
     return path

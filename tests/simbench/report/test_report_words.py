@@ -59,7 +59,7 @@ def test_faults_are_named_with_the_number_that_sets_them() -> None:
 
 def test_every_pipeline_that_is_installed_has_plain_words_of_its_own() -> None:
     ours = [name for name in pipeline_names() if ":" not in name]
-    assert set(OURS) - {ORACLE} == set(ours) and len(ours) == 8
+    assert set(OURS) - {ORACLE} == set(ours) and len(ours) == 9
     for words in ("name", "short", "takes"):
         assert len({getattr(OURS[name], words) for name in OURS}) == len(OURS)
     for plain in OURS.values():
