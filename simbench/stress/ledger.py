@@ -53,9 +53,12 @@ class Ledger:
             raise BadInput(
                 f"{self._path} holds another stress test; give another --out, or remove it to start anew"
             )
-        for line in lines[1:]:
-            outcomes = tuple(_outcome(entry) for entry in json.loads(line))
-            self.done[(outcomes[0].point, outcomes[0].seed)] = outcomes
+        for number, line in enumerate(lines[1:], start=2):
+            try:
+                outcomes = tuple(_outcome(entry) for entry in json.loads(line))
+                self.done[(outcomes[0].point, outcomes[0].seed)] = outcomes
+            except (ValueError, TypeError, KeyError, IndexError) as error:
+                raise BadInput(f"{self._path}, line {number}: is no outcome of a stress test") from error
         if len(whole) < len(text):  # cut off while it was written
             os.truncate(self._path, len(whole.encode("utf-8")))
 

@@ -83,6 +83,15 @@ def test_a_ledger_of_another_test_is_refused(short: None, tmp_path: Path) -> Non
     assert (tmp_path / NAME).read_bytes() == before
 
 
+@pytest.mark.parametrize("line", ["{broken", "[]", "3", "[3]", '[{"point": [1]}]'])
+def test_a_broken_line_of_a_ledger_costs_one_sentence(tmp_path: Path, line: str) -> None:
+    Ledger(tmp_path, {"a": 1})
+    with (tmp_path / NAME).open("a", encoding="utf-8") as file:
+        file.write(line + "\n")
+    with pytest.raises(BadInput, match="line 2: is no outcome"):
+        Ledger(tmp_path, {"a": 1})
+
+
 def test_a_ledger_gives_back_what_was_put_in(tmp_path: Path) -> None:
     kept = (outcome(tpr=0.5, precision=None), outcome("oracle", tpr=1.0))
     Ledger(tmp_path, {"a": 1}).add(kept)
