@@ -179,6 +179,7 @@ SPECS: tuple[type[FaultSpec], ...] = (
     Split,
 )
 SEVERITIES: tuple[Severity, ...] = (
+    Severity(fault=EdgeError.name, values=(0.01, 0.02, 0.03, 0.05, 0.1), source="judgement"),
     Severity(fault=Misses.name, values=(2.0, 5.0, 10.0, 20.0, 40.0), source="judgement"),
     Severity(fault=FalseBoxes.name, values=(0.05, 0.1, 0.3, 1.0, 3.0), source="judgement"),
     Severity(fault=IdentitySwitches.name, values=(0.05, 0.1, 0.3, 1.0, 3.0), source="judgement"),

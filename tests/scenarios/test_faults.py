@@ -277,7 +277,7 @@ def test_severities_rise_and_make_valid_specs() -> None:
     with pytest.raises(BadInput, match="1 to 5"):
         severe("motion.flex_deg", 6)
     with pytest.raises(BadInput, match="has no severities"):
-        severe("detector.edge_error", 1)
+        severe("calibration.mixup", 1)
 
 
 @pytest.mark.parametrize(
