@@ -21,7 +21,7 @@ from scenarios.errors import BadInput, Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments, parse_faults
 from scenarios.faults import TriggerOffset
 from scenarios.load import Family, load_scenario
-from simbench.faults.draw import struck
+from simbench.faults.struck import struck
 from simbench.faults.timing import delays_ns
 from simbench.score.frames import nearest
 from simbench.sensors.clock import CameraTiming, ticks_ns

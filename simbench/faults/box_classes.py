@@ -14,7 +14,6 @@ from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     Labelled,
-    cameras_of,
     frames_in,
     judge_share,
     keeps_boxes,
@@ -25,6 +24,7 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
 
 NOTE = "delivered against true categories"
 
@@ -32,7 +32,7 @@ NOTE = "delivered against true categories"
 def act(spec: ClassConfusion, delivery: Delivery, site: Site) -> Acted:
     names, known = object_names(site), site.rig.rig.detector.categories
     shots, seen, changed = dict(delivery.shots), 0, 0
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         frames = frames_in(shots[camera])
         draws = {
             i: stream(site.seed, "fault", spec.name, camera, name).random((frames, 2))
@@ -61,7 +61,7 @@ def receipts(spec: ClassConfusion, step: Step, site: Site) -> tuple[Receipt, ...
     true = {info.object_id: info.category for info in site.motion.world.objects}
     known = set(site.rig.rig.detector.categories)
     wrong = boxes = spoiled = 0
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         for (old, i), (new, j) in zip(labelled(was), labelled(now), strict=True):
             if i >= 0 and len(known) > 1:
                 boxes += 1
@@ -73,7 +73,7 @@ def receipts(spec: ClassConfusion, step: Step, site: Site) -> tuple[Receipt, ...
     return (
         judge_share(spec, "another category", spec.percent, step, wrong, boxes, note=NOTE),
         *keeps_boxes(spec, step, spoiled, "changed otherwise"),
-        *spares(spec, step),
+        *spares(spec, step, site),
     )
 
 

@@ -12,13 +12,12 @@ from dataclasses import replace
 
 from scenarios.faults.detector import IdentitySwitches
 from scenarios.seeding import stream
+from simbench.faults.chances import share_allowed
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     EXACT,
     NO_BOXES,
-    cameras_of,
-    chance_allowance,
     frames_in,
     fresh_ids,
     keeps_boxes,
@@ -28,6 +27,7 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 NOTE = "changes of ids, frame by frame"
 QUANTITY = "identity switches"
@@ -36,7 +36,7 @@ QUANTITY = "identity switches"
 def act(spec: IdentitySwitches, delivery: Delivery, site: Site) -> Acted:
     shots, switches, time_s = dict(delivery.shots), 0, 0.0
     least = 2 if spec.mode == "swap" else 1
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         path, frame_s = (site.seed, "fault", spec.name, camera), 1.0 / site.rig.cameras[camera].rate_hz
         draws = stream(*path).random((frames_in(shots[camera]), 3))
         ids = fresh_ids(delivery, site, stream(*path, "ids"))
@@ -75,7 +75,7 @@ def receipts(spec: IdentitySwitches, step: Step, site: Site) -> tuple[Receipt, .
     changes, frames, time_s, spoiled = 0, 0, 0.0, 0
     last: dict[tuple[str, int], int] = {}
     shown: dict[str, set[int]] = defaultdict(set)
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         camera = was.detections.sensor
         again = {b.track_id for b, i in labelled(was) if i >= 0} & shown[camera]
         if len(again) >= (2 if spec.mode == "swap" else 1):
@@ -98,9 +98,9 @@ def receipts(spec: IdentitySwitches, step: Step, site: Site) -> tuple[Receipt, .
             fault=spec.name, quantity=QUANTITY, unit="per s", requested=spec.per_s,
             realised=step.realised["per_s"],
             measured=changes / (2.0 if spec.mode == "swap" else 1.0) / time_s, estimator_sd=EXACT,
-            allowed=chance_allowance(min(spec.per_s * frame_s, 1.0), frames) / frame_s, note=NOTE,
+            allowed=share_allowed(min(spec.per_s * frame_s, 1.0), frames) / frame_s, note=NOTE,
         )  # fmt: skip
-    return (one, *keeps_boxes(spec, step, spoiled, "changed otherwise"), *spares(spec, step))
+    return (one, *keeps_boxes(spec, step, spoiled, "changed otherwise"), *spares(spec, step, site))
 
 
 FAULT = DeliveryFault(spec=IdentitySwitches, act=act, receipts=receipts)

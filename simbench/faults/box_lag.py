@@ -18,7 +18,6 @@ from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     EXACT,
     Labelled,
-    cameras_of,
     keeps_boxes,
     labelled,
     objects_in,
@@ -27,6 +26,7 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 NOTE = "boxes of the same object in this frame and the one before"
 LEAST_PX = 0.1  # that boxes must move in all, to show a lag
@@ -34,7 +34,7 @@ LEAST_PX = 0.1  # that boxes must move in all, to show a lag
 
 def act(spec: BoxLag, delivery: Delivery, site: Site) -> Acted:
     shots = dict(delivery.shots)
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         by_frame = {
             shot.detections.seq: {box.track_id: box.box_px for box in shot.detections.boxes}
             for shot in shots[camera]
@@ -62,7 +62,7 @@ def receipts(spec: BoxLag, step: Step, site: Site) -> tuple[Receipt, ...]:
     """Least squares of the delivered shift on the way back, over objects with one box in both frames."""
     seen: dict[tuple[str, int], dict[int, tuple[np.ndarray, np.ndarray]]] = defaultdict(dict)
     spoiled = 0
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         once = {i for i, n in objects_in(labelled(was)).items() if n == 1}
         for (old, i), (new, j) in zip(labelled(was), labelled(now), strict=True):
             spoiled += i != j or replace(old, box_px=new.box_px) != new
@@ -86,7 +86,7 @@ def receipts(spec: BoxLag, step: Step, site: Site) -> tuple[Receipt, ...]:
             allowed=0.01 * spec.lag_frames, note=NOTE if shows else "no box moved",
         ),
         *keeps_boxes(spec, step, spoiled, "changed otherwise"),
-        *spares(spec, step),
+        *spares(spec, step, site),
     )  # fmt: skip
 
 

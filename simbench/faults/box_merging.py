@@ -18,7 +18,6 @@ from simbench.faults.delivery import Delivery, Shot
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     Labelled,
-    cameras_of,
     frames_in,
     judge_share,
     keeps_boxes,
@@ -29,13 +28,14 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
 
 NOTE = "one box around both in place of two"
 
 
 def act(spec: Merged, delivery: Delivery, site: Site) -> Acted:
     names, shots, seen, merged = object_names(site), dict(delivery.shots), 0, 0
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         frames = frames_in(shots[camera])
         draws: dict[tuple[str, str], np.ndarray] = {}
         result = []
@@ -101,7 +101,7 @@ def _around(p: BoxPx, q: BoxPx) -> BoxPx:
 def receipts(spec: Merged, step: Step, site: Site) -> tuple[Receipt, ...]:
     """Share of the pairs that one box fills, which is the larger one's object and goes on under its id."""
     pairs = joined = spoiled = 0
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         old, after = labelled(was), labelled(now)
         by_key = {(b.track_id, i): np.array(b.box_px) for b, i in after}
         joins: set[int] = set()
@@ -121,7 +121,7 @@ def receipts(spec: Merged, step: Step, site: Site) -> tuple[Receipt, ...]:
     return (
         judge_share(spec, "merged", spec.percent, step, joined, pairs, note=NOTE),
         *keeps_boxes(spec, step, spoiled, "neither themselves nor merged"),
-        *spares(spec, step),
+        *spares(spec, step, site),
     )
 
 

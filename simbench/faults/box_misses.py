@@ -15,12 +15,11 @@ from jaxtyping import Bool
 
 from scenarios.faults.detector import Misses
 from scenarios.seeding import stream
+from simbench.faults.chances import share_allowed
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     EXACT,
-    cameras_of,
-    chance_allowance,
     frames_in,
     judge_share,
     keeps_boxes,
@@ -31,6 +30,7 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 NOTE = "true boxes before and after"
 FEWEST = 5  # misses, to say what follows them
@@ -61,7 +61,7 @@ def act(spec: Misses, delivery: Delivery, site: Site) -> Acted:
     names, shots = object_names(site), dict(delivery.shots)
     seen = lost = 0
     follows: list[bool] = []
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         frames = frames_in(shots[camera])
         chains = {i: _missed(spec, camera, name, frames, site.seed) for i, name in names.items()}
         shown = {i: np.zeros(frames, dtype=bool) for i in names}
@@ -90,7 +90,7 @@ def receipts(spec: Misses, step: Step, site: Site) -> tuple[Receipt, ...]:
     """Share of the true boxes that are gone; with bursts, how often a miss follows a miss."""
     before, spoiled = 0, 0
     gone: dict[tuple[str, int], dict[int, bool]] = defaultdict(dict)
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         still = set(labelled(now))
         spoiled += len(still - set(labelled(was)))
         for item in labelled(was):
@@ -114,10 +114,10 @@ def receipts(spec: Misses, step: Step, site: Site) -> tuple[Receipt, ...]:
             judge(
                 fault=spec.name, quantity="a miss follows a miss", unit="share", requested=after_miss,
                 realised=step.realised["follows"], measured=sum(follow) / len(follow), estimator_sd=EXACT,
-                allowed=chance_allowance(after_miss, len(follow)), note=NOTE,
+                allowed=share_allowed(after_miss, len(follow)), note=NOTE,
             )
         )  # fmt: skip
-    return (*result, *keeps_boxes(spec, step, spoiled, "other boxes lost or new"), *spares(spec, step))
+    return (*result, *keeps_boxes(spec, step, spoiled, "other boxes lost or new"), *spares(spec, step, site))
 
 
 FAULT = DeliveryFault(spec=Misses, act=act, receipts=receipts)

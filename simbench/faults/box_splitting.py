@@ -17,7 +17,6 @@ from scenarios.seeding import stream
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
-    cameras_of,
     frames_in,
     fresh_ids,
     judge_share,
@@ -29,13 +28,14 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
 
 NOTE = "two boxes side by side in place of one"
 
 
 def act(spec: Split, delivery: Delivery, site: Site) -> Acted:
     names, shots, seen, split = object_names(site), dict(delivery.shots), 0, 0
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         path = (site.seed, "fault", spec.name, camera)
         frames, ids = frames_in(shots[camera]), fresh_ids(delivery, site, stream(*path, "ids"))
         draws = {i: stream(*path, "object", name).random((frames, 2)) for i, name in names.items()}
@@ -70,7 +70,7 @@ def receipts(spec: Split, step: Step, site: Site) -> tuple[Receipt, ...]:
     """Share of the true boxes that two boxes of the same object now fill, one of them under a new id."""
     had = {b.track_id for s in step.before.shots.values() for shot in s for b in shot.detections.boxes}
     boxes = halved = spoiled = 0
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         after = labelled(now)
         explained = 0
         for item in labelled(was):
@@ -92,7 +92,7 @@ def receipts(spec: Split, step: Step, site: Site) -> tuple[Receipt, ...]:
     return (
         judge_share(spec, "split", spec.percent, step, halved, boxes, note=NOTE),
         *keeps_boxes(spec, step, spoiled, "neither whole nor two halves"),
-        *spares(spec, step),
+        *spares(spec, step, site),
     )
 
 

@@ -22,7 +22,8 @@ from simbench.axes import R_BODY_OPTICAL
 from simbench.faults.estimate import CameraEvidence, bracket_turn_rad, detrended
 from simbench.faults.known import told_pose
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness, spared, struck
+from simbench.faults.struck import spared, struck
+from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness
 
 KEY = CalibrationRotation.name
 NOTE = "told extrinsic against the mean attitude by PnP"
@@ -68,7 +69,7 @@ def receipts(spec: CalibrationRotation, step: Telling, witness: Witness) -> tupl
     seen = {item.camera: item for item in witness.evidence}
     result: list[Receipt] = []
     others: list[tuple[float, float]] = []
-    for sensor in (*witness.place.cameras, witness.place.lidar):
+    for sensor in (*witness.place.cameras, witness.place.lidar_name):
         drawn_deg = np.array([step.realised.get(f"{sensor} {name}", 0.0) for name in AXES])
         if sensor in spared(spec, witness.place):
             turn_deg, sd_deg = _excess_deg(sensor, np.zeros(3), step, seen, witness)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 from jaxtyping import Float64
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from fusion.calibrate import LEAST_POSES, Pairs, find_extrinsics
 from fusion.calibrate_board import Board, CalibrationError
@@ -22,7 +22,8 @@ from simbench.calibration.volume import Sight, Volume, draw_poses, to_calibrate
 from simbench.faults.estimate import gain
 from simbench.faults.known import AHEAD_M, pixels, told_pose
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness, spared, struck
+from simbench.faults.struck import spared, struck
+from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness
 
 NOTE = "known points by the told pose, before and after, against the drawn error of the pose"
 SD_PX = 0.002
@@ -54,7 +55,7 @@ def _error(
     """T_true_found of a camera and the clicks' noise; None where no calibration comes about."""
     lens, true, board = place.true.cameras[camera], place.true.T_ego_sensor, Board()
     sight = Sight(
-        camera=lens, T_world_camera=true[camera], T_world_lidar=true[place.lidar], elevation_rad=SPAN
+        camera=lens, T_world_camera=true[camera], T_world_lidar=true[place.lidar_name], elevation_rad=SPAN
     )
     wanted = to_calibrate(Volume(near_m=spec.near_m, far_m=spec.far_m))
     held = draw_poses(
@@ -66,12 +67,12 @@ def _error(
     noise_px = spec.noise_px * noise.standard_normal((len(held), 4, 2))
     corners = [pose.apply(board.outer_m) for pose in held]
     at_px = np.array([lens.project(true[camera].inverse().apply(xyz)) for xyz in corners])
-    lidar_m = np.array([true[place.lidar].inverse().apply(xyz) for xyz in corners])
+    lidar_m = np.array([true[place.lidar_name].inverse().apply(xyz) for xyz in corners])
     try:
         found = find_extrinsics(Pairs(lidar_m=lidar_m, image_px=at_px + noise_px), lens)
     except CalibrationError:
         return None
-    return place.true.T_camera_lidar(camera, place.lidar) @ found.T_camera_lidar.inverse(), noise_px
+    return place.true.T_camera_lidar(camera, place.lidar_name) @ found.T_camera_lidar.inverse(), noise_px
 
 
 def receipts(spec: ClickNoise, step: Telling, witness: Witness) -> tuple[Receipt, ...]:
@@ -124,7 +125,7 @@ def _moved_px(step: Telling, camera: str, error: Transform) -> Float64[np.ndarra
 
 def _allowed_px(noise_px: float, numbers: int) -> float:
     """How far the RMS of so many normal numbers may lie from its SD: beyond in one of a million draws."""
-    low, high = np.sqrt(chi2.ppf([0.5 * RARE, 1.0 - 0.5 * RARE], numbers) / numbers)
+    low, high = np.sqrt(chdtri(numbers, [1.0 - 0.5 * RARE, 0.5 * RARE]) / numbers)
     return float(noise_px * max(1.0 - low, high - 1.0))
 
 

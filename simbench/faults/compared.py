@@ -11,7 +11,6 @@ from math import sqrt
 
 import numpy as np
 from jaxtyping import Bool, Float64, Int64
-from scipy.stats import binom
 
 from simbench.faults.delivery import Sweep
 from simbench.faults.fault import Step
@@ -88,14 +87,6 @@ def _points(sweeps: tuple[Sweep, ...]) -> Points:
         true_range_m=true_range_m,
         false=false,
     )
-
-
-def draw_limit_percent(n: int, share: float) -> float:
-    """How far, in per cent, a share of n independent draws strays from its mean once in 1e6 at most."""
-    if n == 0:
-        return 0.0
-    low, high = binom.ppf([5e-7, 1.0 - 5e-7], n, share)
-    return 100.0 * max(float(high) / n - share, share - float(low) / n)
 
 
 def mean_limit_percent(chance: Float64[np.ndarray, " n"]) -> float:

@@ -15,7 +15,8 @@ from scenarios.faults import CalibrationTranslation
 from scenarios.seeding import stream
 from simbench.faults.known import told_pose
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness, spared, struck
+from simbench.faults.struck import spared, struck
+from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness
 
 NOTE = "place by known points, before and after"
 SD_CM = 0.005

@@ -18,6 +18,7 @@ from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
 from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
+from simbench.faults.struck import struck
 from simbench.faults.tell import tell
 from simbench.faults.telling import Place, Telling
 from simbench.sensors.clock import CameraTiming
@@ -41,14 +42,9 @@ class Drawn:
     tellings: tuple[Telling, ...]
 
 
-def struck(spec: TriggerOffset | Flex, rig: SensorRig) -> tuple[str, ...]:
-    """The cameras that a fault acts on."""
-    return spec.named_cameras or tuple(rig.cameras)
-
-
 def place_of(rig: SensorRig, seed: int) -> Place:
     """Where the calibration of a rig is told."""
-    return Place(true=rig.calibration, lidar=rig.lidar_name, seed=seed)
+    return Place(true=rig.calibration, lidar_name=rig.lidar_name, seed=seed)
 
 
 def draw(

@@ -9,18 +9,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import poisson
 
 from fusion.camera import PinholeCamera
 from fusion.messages import Detection
 from scenarios.faults.detector import FalseBoxes
 from scenarios.seeding import stream
+from simbench.faults.chances import count_allowed
 from simbench.faults.delivery import Delivery
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.labelled import (
     EXACT,
-    TAIL,
-    cameras_of,
     frames_in,
     fresh_ids,
     keeps_boxes,
@@ -30,6 +28,7 @@ from simbench.faults.labelled import (
     spares,
 )
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 NOTE = "delivered boxes without a true object"
 QUANTITY = "false boxes per image"
@@ -40,7 +39,7 @@ ASPECT = (0.4, 2.0)  # width over height
 def act(spec: FalseBoxes, delivery: Delivery, site: Site) -> Acted:
     shots, added, images = dict(delivery.shots), 0, 0
     known = site.rig.rig.detector.categories
-    for camera in cameras_of(spec, delivery):
+    for camera in struck(spec, site.rig):
         path = (site.seed, "fault", spec.name, camera)
         counts = stream(*path).poisson(spec.boxes_per_image, frames_in(shots[camera]))
         ids = fresh_ids(delivery, site, stream(*path, "ids"))
@@ -81,7 +80,7 @@ def receipts(spec: FalseBoxes, step: Step, site: Site) -> tuple[Receipt, ...]:
     """False boxes by the truth and boxes in the messages, both more than before; ids, places, true boxes."""
     more = longer = images = spoiled = 0
     had = {b.track_id for s in step.before.shots.values() for shot in s for b in shot.detections.boxes}
-    for was, now in pairs_of_shots(step, cameras_of(spec, step.before)):
+    for was, now in pairs_of_shots(step, struck(spec, site.rig)):
         camera = site.rig.pinholes[now.detections.sensor]
         images += 1
         longer += len(now.detections.boxes) - len(was.detections.boxes)
@@ -102,17 +101,15 @@ def receipts(spec: FalseBoxes, step: Step, site: Site) -> tuple[Receipt, ...]:
                 note="no image was taken",
             ),
         )  # fmt: skip
-    mean = spec.boxes_per_image * images
-    low, high = poisson.ppf([TAIL, 1.0 - TAIL], mean) if mean > 0.0 else (0.0, 0.0)
     spoiled += abs(longer - more)
     return (
         judge(
             fault=spec.name, quantity=QUANTITY, unit="boxes", requested=spec.boxes_per_image,
             realised=step.realised["boxes_per_image"], measured=more / images, estimator_sd=EXACT,
-            allowed=float(max(high - mean, mean - low)) / images + 1e-9, note=NOTE,
+            allowed=count_allowed(spec.boxes_per_image * images) / images + 1e-9, note=NOTE,
         ),
         *keeps_boxes(spec, step, spoiled, "boxes lost, outside, or with a known id"),
-        *spares(spec, step),
+        *spares(spec, step, site),
     )  # fmt: skip
 
 

@@ -17,16 +17,10 @@ from scenarios.faults import FaultSpec
 from simbench.faults.delivery import Delivery, Shot, Sweep
 from simbench.faults.fault import Step
 from simbench.faults.receipt import Receipt, untouched
+from simbench.faults.struck import struck
 from simbench.sensors.rig import SensorRig
 
 COUNT_SD = 1e-6  # of what is counted or read off in whole nanoseconds
-
-
-def struck(spec: FaultSpec, rig: SensorRig) -> tuple[str, ...]:
-    """The sensors that a fault acts on, by their names on the rig."""
-    if getattr(spec, "sensors", "cameras") == "lidar":
-        return (rig.lidar_name,)
-    return spec.named_cameras or tuple(rig.cameras)
 
 
 def items(delivery: Delivery, rig: SensorRig, sensor: str) -> tuple[Sweep | Shot, ...]:

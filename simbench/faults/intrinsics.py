@@ -17,7 +17,8 @@ from fusion.messages import Calibration
 from scenarios.faults import FocalLength, PixelShift
 from simbench.faults.known import AHEAD_M, pixels
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness, spared, struck
+from simbench.faults.struck import spared, struck
+from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness
 
 NOTE = "known points by the told camera, before and after"
 SHIFT_SD_PX = 1e-3

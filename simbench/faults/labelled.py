@@ -7,20 +7,20 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import binom
 
 from fusion.messages import Detection
 from scenarios.faults import FaultSpec
+from simbench.faults.chances import share_allowed
 from simbench.faults.delivery import Delivery, Shot
 from simbench.faults.fault import Site, Step
 from simbench.faults.receipt import Receipt, judge, untouched
+from simbench.faults.struck import struck
 from simbench.sensors.detector import TRACK_IDS, draw_track_ids
 
 Labelled = tuple[Detection, int]
 """A box and the true object behind it (-1: a false box)."""
 
 EXACT = 1e-6  # of a count
-TAIL = 5e-7  # each side: an interval that 1 in a million draws misses
 NO_BOXES = "no box was delivered that it could act on"
 
 
@@ -37,11 +37,6 @@ def relabelled(shot: Shot, boxes: Iterable[Labelled]) -> Shot:
         detections=replace(shot.detections, boxes=tuple(box for box, _ in boxes)),
         truth=replace(shot.truth, detection_object_id=tuple(object_id for _, object_id in boxes)),
     )
-
-
-def cameras_of(spec: FaultSpec, delivery: Delivery) -> tuple[str, ...]:
-    """The cameras that a fault acts on."""
-    return spec.named_cameras or tuple(delivery.shots)
 
 
 def frames_in(shots: Sequence[Shot]) -> int:
@@ -74,13 +69,6 @@ def pairs_of_shots(step: Step, cameras: Iterable[str]) -> Iterator[tuple[Shot, S
         yield from zip(step.before.shots[camera], step.after.shots[camera], strict=True)
 
 
-def chance_allowance(share: float, of: float) -> float:
-    """How far from `share` the share of `of` even draws may lie, but for one run in a million."""
-    n = max(round(of), 1)
-    low, high = binom.ppf([TAIL, 1.0 - TAIL], n, share) / n
-    return float(max(high - share, share - low)) + 1e-9
-
-
 def judge_share(
     spec: FaultSpec, quantity: str, percent: float, step: Step, found: int, of: int, *,
     note: str, free: float | None = None,
@@ -94,13 +82,13 @@ def judge_share(
     return judge(
         fault=spec.name, quantity=quantity, unit="%", requested=percent,
         realised=step.realised.get("percent", 0.0), measured=100.0 * found / of, estimator_sd=EXACT,
-        allowed=100.0 * chance_allowance(0.01 * percent, of if free is None else free), note=note,
+        allowed=100.0 * share_allowed(0.01 * percent, of if free is None else free), note=note,
     )  # fmt: skip
 
 
-def spares(spec: FaultSpec, step: Step) -> tuple[Receipt, ...]:
+def spares(spec: FaultSpec, step: Step, site: Site) -> tuple[Receipt, ...]:
     """That the cameras which the fault does not name deliver what they did."""
-    named = cameras_of(spec, step.before)
+    named = struck(spec, site.rig)
     found = []
     for camera in step.before.shots:
         if camera not in named:

@@ -17,7 +17,8 @@ from fusion.messages import Calibration
 from scenarios.faults import CalibrationMixup
 from simbench.faults.known import AHEAD_M, pixels, told_pose
 from simbench.faults.receipt import Receipt, judge, untouched
-from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness, spared, struck
+from simbench.faults.struck import spared, struck
+from simbench.faults.telling import CalibrationFault, Place, Telling, Told, Witness
 
 NOTE = "known points by the told pose, before and after"
 SD_SHARE = 1e-3

@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Int64
 
 from scenarios.faults.lidar import Ghosts
-from simbench.faults.compared import BEAMS, compared, draw_limit_percent
+from simbench.faults.chances import share_allowed
+from simbench.faults.compared import BEAMS, compared
 from simbench.faults.delivery import Delivery, Sweep
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.firings import firings, uniform, with_false_points
@@ -57,7 +58,7 @@ def haunt_receipts(spec: Ghosts, step: Step, site: Site) -> tuple[Receipt, ...]:
         judge(
             fault=spec.name, quantity="false points", unit="% of firings", requested=spec.percent,
             realised=step.realised["ghosts"], measured=100.0 * count / n if n else None,
-            estimator_sd=10.0 / max(n, 1), allowed=draw_limit_percent(n, 0.01 * spec.percent),
+            estimator_sd=10.0 / max(n, 1), allowed=100.0 * share_allowed(0.01 * spec.percent, n),
             note="new points on no part of anything",
         ),
         judge(

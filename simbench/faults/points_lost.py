@@ -14,9 +14,9 @@ from jaxtyping import Bool, Int64
 
 from scenarios.faults.lidar import BeamLoss, Dropout, WeakDropout
 from scenarios.seeding import stream
+from simbench.faults.chances import share_allowed
 from simbench.faults.compared import (
     compared,
-    draw_limit_percent,
     loss,
     mean_limit_percent,
     points_as_before,
@@ -64,7 +64,7 @@ def drop_receipts(spec: Dropout, step: Step, site: Site) -> tuple[Receipt, ...]:
             realised=step.realised["lost"],
             measured=both.percent_lost(),
             points=n,
-            allowed=draw_limit_percent(n, 0.01 * spec.percent),
+            allowed=100.0 * share_allowed(0.01 * spec.percent, n),
         ),
         *points_as_before(spec.name, both),
     )

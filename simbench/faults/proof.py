@@ -15,9 +15,10 @@ from simbench.faults import motion as motion_fault
 from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
 from simbench.faults.deliver import DELIVERY_FAULTS
-from simbench.faults.draw import place_of, struck
+from simbench.faults.draw import place_of
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
 from simbench.faults.tell import told_receipts
 from simbench.faults.telling import Witness
 from simbench.sensors import fiducials

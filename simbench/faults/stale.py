@@ -15,8 +15,9 @@ from scenarios.seeding import stream
 from simbench.faults.chances import share_allowed
 from simbench.faults.delivery import Delivery, Shot
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
-from simbench.faults.flow import COUNT_SD, elsewhere, struck
+from simbench.faults.flow import COUNT_SD, elsewhere
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 NOTE = "boxes of every frame against those delivered before, and their true exposures"
 

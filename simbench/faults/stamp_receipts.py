@@ -30,8 +30,9 @@ from simbench.faults.chances import (
     spread_allowed,
 )
 from simbench.faults.fault import Site, Step
-from simbench.faults.flow import Times, elsewhere, struck, times
+from simbench.faults.flow import Times, elsewhere, times
 from simbench.faults.receipt import Receipt, judge, untouched
+from simbench.faults.struck import struck
 
 STAMP_SD_MS = 2e-6  # stamps are whole nanoseconds
 NOTE = "stamps of the same exposures, found by their true times, after against before"
@@ -177,8 +178,7 @@ def step(spec: StampStep, seen: Seen) -> tuple[Receipt, ...]:
 def jitter(spec: StampJitter, seen: Seen) -> tuple[Receipt, ...]:
     """Mean of the changes, and their SD by their median size, which heavy tails do not move."""
     n, sd, change_ms = len(seen.before), spec.sd_ms, seen.change_ms
-    unit = float(SPREADS[spec.distribution].ppf(0.75))
-    spread = float(np.median(np.abs(change_ms))) / unit
+    spread = float(np.median(np.abs(change_ms)) / SPREADS[spec.distribution](0.75))
     heavy = 20.0 if spec.distribution == "heavy_tailed" else 5.0  # one far draw moves a mean of t with 3
     return (
         seen.judged(spec, "mean", "ms", 0.0, float(change_ms.mean()), STAMP_SD_MS, heavy * sd / np.sqrt(n)),

@@ -25,11 +25,13 @@ from scenarios.faults import (
 )
 from scenarios.seeding import stream
 from simbench.faults import stamp_receipts
-from simbench.faults.chances import late_ns, queued_ns, scattered, spread_by_median
+from simbench.faults.chances import late_ns, scattered, spread_by_median
 from simbench.faults.delivery import Delivery, Shot, Sweep
 from simbench.faults.fault import Acted, DeliveryFault, Site
-from simbench.faults.flow import items, struck, true_ns, with_items
+from simbench.faults.flow import items, true_ns, with_items
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
+from simbench.sensors.clock import queued_ns
 
 MS = 1e-6  # in a nanosecond
 

@@ -14,10 +14,10 @@ from simbench.faults.receipt import Receipt
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
-    """Where a calibration is told: the true one, which of its sensors is the LiDAR, the run's seed."""
+    """Where a calibration is told: the true one, the name of its LiDAR, the run's seed."""
 
     true: Calibration
-    lidar: str
+    lidar_name: str
     seed: int
 
     @property
@@ -61,17 +61,3 @@ class CalibrationFault:
     spec: type[FaultSpec]
     tell: Callable[[Any, Calibration, Place], Told]
     receipts: Callable[[Any, Telling, Witness], tuple[Receipt, ...]]
-
-
-def struck(spec: FaultSpec, place: Place) -> tuple[str, ...]:
-    """The sensors that a fault acts on."""
-    if getattr(spec, "sensors", "cameras") == "lidar":
-        return (place.lidar,)
-    return spec.named_cameras or place.cameras
-
-
-def spared(spec: FaultSpec, place: Place) -> tuple[str, ...]:
-    """The sensors that a fault leaves alone, where it says which ones it acts on; else none."""
-    if getattr(spec, "sensors", "cameras") == "cameras":
-        return ()
-    return tuple(name for name in (*place.cameras, place.lidar) if name not in struck(spec, place))

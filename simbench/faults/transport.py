@@ -11,11 +11,13 @@ from jaxtyping import Bool
 from scenarios.faults import Dropped, Duplicated, FaultSpec, Latency, Reordered
 from scenarios.seeding import stream
 from simbench.faults import stale, transport_receipts
-from simbench.faults.chances import late_ns, queued_ns
+from simbench.faults.chances import late_ns
 from simbench.faults.delivery import Delivery, Shot, Sweep
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
-from simbench.faults.flow import items, struck, with_items
+from simbench.faults.flow import items, with_items
 from simbench.faults.receipt import Receipt
+from simbench.faults.struck import struck
+from simbench.sensors.clock import queued_ns
 
 HELD_NS = 1_000_000  # how long after its successor a message arrives that was held back
 

@@ -14,8 +14,9 @@ import numpy as np
 from scenarios.faults import Dropped, Duplicated, FaultSpec, Latency, Reordered
 from simbench.faults.chances import least_wait_allowed, mean_wait_allowed, share_allowed
 from simbench.faults.fault import Site, Step
-from simbench.faults.flow import COUNT_SD, Times, elsewhere, struck, times
+from simbench.faults.flow import COUNT_SD, Times, elsewhere, times
 from simbench.faults.receipt import Receipt, judge
+from simbench.faults.struck import struck
 
 ARRIVAL_SD_MS = 2e-6  # arrivals are whole nanoseconds
 IDENTITY = ("true_ns", "stamp_ns")

@@ -64,7 +64,7 @@ def draw_on_recording(
     seed: int,
 ) -> DrawnOnRecording:
     """frames, rings: how many the recording has (rings: 0 where they were not looked for)."""
-    told, tellings = tell(faults, Place(true=true, lidar=LIDAR, seed=seed))
+    told, tellings = tell(faults, Place(true=true, lidar_name=LIDAR, seed=seed))
     edges: dict[int, Float64[np.ndarray, "f 4"]] = {}
     if (error := faults.get(EdgeError)) is not None:
         edges = detector_fault.edge_errors(error, CAMERA, objects, frames, period_s, seed)

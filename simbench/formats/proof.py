@@ -52,7 +52,7 @@ def recorded_receipts(
     truth, result = recording.truth, list[Receipt]()
     evidence = (_evidence(recording),) if truth.images and asks_to_tell(faults) else ()
     # What was drawn needs no seed any more.
-    place = Place(true=truth.calibration, lidar=LIDAR, seed=0)
+    place = Place(true=truth.calibration, lidar_name=LIDAR, seed=0)
     witness = Witness(place=place, evidence=evidence, body=None)
     result += told_receipts(faults, drawn.tellings, recording.calibration, witness)
     detections = [m for m in recording.messages if isinstance(m, Detections)]

@@ -12,7 +12,7 @@ from jaxtyping import Float64, Int64
 
 from scenarios.scenario import CameraSensor, ends
 
-BEHIND_NS = 1_000  # an image that catches up with the one before is handed over this much later
+BEHIND_NS = 1_000  # one that catches up with the one before comes this much later
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +73,14 @@ def _at_host_ns(
     delay_ms = rng.uniform(*ends(sensor.stamp_delay_ms))
     wait_ms = rng.uniform(*ends(sensor.stamp_jitter_ms)) * rng.standard_exponential(len(mid_ns))
     alone = mid_ns + np.round((delay_ms + wait_ms) * 1e6).astype(np.int64)
-    behind = BEHIND_NS * np.arange(len(mid_ns))
-    queued: np.ndarray = np.maximum.accumulate(alone - behind) + behind
-    return queued
+    return queued_ns(alone)
+
+
+def queued_ns(at_ns: Int64[np.ndarray, " n"]) -> Int64[np.ndarray, " n"]:
+    """The same instants, none before the one ahead of it."""
+    behind = BEHIND_NS * np.arange(len(at_ns))
+    queue: np.ndarray = np.maximum.accumulate(at_ns - behind) + behind
+    return queue
 
 
 def drawn_ns(value_ms: float | tuple[float, float], rng: np.random.Generator) -> int:

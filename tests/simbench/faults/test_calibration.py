@@ -286,7 +286,7 @@ def test_a_rig_of_one_camera_has_none_to_swap_with() -> None:
     spec, true = CalibrationMixup(what="cameras_swapped"), place().true
     one = Place(
         true=Calibration(T_ego_sensor=true.T_ego_sensor, cameras={FRONT: true.cameras[FRONT]}),
-        lidar=place().lidar, seed=0,
+        lidar_name=place().lidar_name, seed=0,
     )  # fmt: skip
     told, tellings = tell(faults(spec), one)
     (found,) = told_receipts(faults(spec), tellings, told, Witness(place=one, evidence=(), body=None))
