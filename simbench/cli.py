@@ -598,14 +598,29 @@ def timeline(
 
 
 @main.command()
-def doctor() -> None:
+@click.argument("names", nargs=-1, metavar="[FAULT...]")
+@click.option("--faults", is_flag=True, help="Prove the faults of the catalogue instead, or those named.")
+@click.option("--quick", is_flag=True, help="10 honest draws a fault instead of 5,000.")
+@click.option("--draws", type=click.IntRange(2), default=None, help="So many honest draws.")
+@click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
+def doctor(names: tuple[str, ...], faults: bool, quick: bool, draws: int | None, jobs: int | None) -> None:
     """Say what this machine offers and what is missing.
 
-    Example: simbench doctor
-    """
-    from simbench import doctor as rooms
+    With --faults: make every fault do what it should not (nothing, half, double, the wrong sign, sensor or
+    unit, twice) and see whether the receipts notice; draw it honestly many times and see that they do not;
+    raise its severity and see that its effect grows.
 
-    raise SystemExit(rooms.main())
+    Example: simbench doctor --faults --quick timing.clock_offset_ms
+    """
+    if not faults:
+        if names or quick or draws is not None:
+            raise click.UsageError("fault names, --quick and --draws go with --faults")
+        from simbench import doctor as rooms
+
+        raise SystemExit(rooms.main())
+    from simbench.proving.command import FULL, QUICK, prove_faults
+
+    raise SystemExit(prove_faults(names, draws or (QUICK if quick else FULL), jobs))
 
 
 @main.command()

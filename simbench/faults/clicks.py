@@ -104,9 +104,10 @@ def receipts(spec: ClickNoise, step: Telling, witness: Witness) -> tuple[Receipt
 
 
 def _none_found(spec: ClickNoise, camera: str) -> Receipt:
+    """The camera is told what was told before: the fault took no effect."""
     return judge(
         fault=spec.name, quantity=f"{camera} clicks", unit="px", requested=spec.noise_px,
-        realised=spec.noise_px, measured=None, estimator_sd=SD_PX, allowed=0.0,
+        realised=0.0, measured=0.0, estimator_sd=SD_PX, allowed=0.0,
         note="no calibration comes about: too few boards fit into the zone, or they do not determine a pose",
     )  # fmt: skip
 

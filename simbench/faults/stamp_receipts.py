@@ -205,15 +205,20 @@ def saved(spec: StampOnSave, seen: Seen) -> tuple[Receipt, ...]:
 
 
 def quantum(spec: StampQuantum, seen: Seen) -> tuple[Receipt, ...]:
-    """What is rounded off on average (anything up to a quantum: stamps may lie on the grid already), and that
-    every stamp lies on the grid.
+    """What is rounded off on average (anything up to a quantum: stamps may lie on the grid already), that no
+    stamp loses a quantum or gains anything, and that every stamp lies on the grid.
     """
     half = 0.5 * spec.quantum_ms
+    beyond_ms = np.maximum(-seen.change_ms - spec.quantum_ms, seen.change_ms).max()
     rest_ms = seen.after.stamp_ns % max(round(spec.quantum_ms * 1e6), 1) * 1e-6
     return (
         seen.judged(spec, "rounded off", "ms", half, -float(seen.change_ms.mean()), STAMP_SD_MS, half),
         *untouched(
             fault=spec.name, quantity=f"{seen.sensor} farthest off the grid", unit="ms",
             found=[(float(rest_ms.max()), STAMP_SD_MS)], note="stamps modulo the quantum",
+        ),
+        *untouched(
+            fault=spec.name, quantity=f"{seen.sensor} rounded by more than a quantum", unit="ms",
+            found=[(max(float(beyond_ms), 0.0), STAMP_SD_MS)], note=NOTE,
         ),
     )  # fmt: skip

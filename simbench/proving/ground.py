@@ -1,0 +1,111 @@
+"""Where faults are proved: one busy drive, measured once, on which every fault acts anew.
+
+The catalogue's overtaking manoeuvre with more people and cars beside the lanes, so that there are boxes to
+merge, miss and mistake; a LiDAR of few columns and small pictures, because receipts count points and pixels,
+and do not need many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+from scenarios.fault_set import FaultSet
+from scenarios.faults import FaultSpec
+from simbench.capture import Captured
+from simbench.case import Job
+from simbench.sensors.detector import perfect
+from simbench.sensors.pictures import by_rays
+from simbench.stage import Stage, record, stage
+
+SCENARIO, SYSTEM = "overtake-approach", "car"
+CROWD = (
+    "background.3.count=7",
+    "background.4.count=7",
+    "background.5.count=24",
+    "background.5.area_m=[-10, -24, 95, -9]",
+    "background.0.count=4",
+)
+COLUMNS = 96
+SWEEPS_S = 0.8
+SIZE_PX = (320, 200)
+DURATION_S = 6.0
+PICTURES_S = 0.5
+SHORT_S = 2.0
+LONG_S = 25.0
+FEW_COLUMNS = 8
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ground:
+    """A drive without faults. staged: with as many columns as were measured."""
+
+    staged: Stage
+    captured: Captured
+
+
+def fault_set(specs: Sequence[FaultSpec]) -> FaultSet:
+    """Exactly these, those that are off too."""
+    return FaultSet(specs=tuple(specs), label="proved")
+
+
+def _staged(seed: int, duration_s: float, columns: int, size_px: tuple[int, int], crowd: bool) -> Stage:
+    job = Job(
+        scenario=SCENARIO, system=SYSTEM, seed=seed, pipelines=(), changes=CROWD if crowd else (),
+        size_px=size_px,
+    )  # fmt: skip
+    whole = stage(job)
+    rig = replace(whole.rig, lidar=whole.rig.lidar.model_copy(update={"columns": columns}))
+    system = whole.system.model_copy(update={"duration_s": duration_s})
+    return replace(whole, rig=rig, system=system)
+
+
+@lru_cache(maxsize=1)
+def measured() -> Ground:
+    """Boxes, ego motions and the reference of the drive, and sweeps of few points."""
+    staged = _staged(0, DURATION_S, FEW_COLUMNS, SIZE_PX, crowd=True)
+    return Ground(staged=staged, captured=record(_job(0), staged))
+
+
+@lru_cache(maxsize=1)
+def swept() -> Ground:
+    """A few sweeps of the same drive with many points."""
+    staged = _staged(0, SWEEPS_S, COLUMNS, SIZE_PX, crowd=True)
+    return Ground(staged=staged, captured=record(_job(0), staged))
+
+
+@lru_cache(maxsize=1)
+def long() -> Ground:
+    """A drive that is long enough for outages of the reference; without boxes, and with few points."""
+    staged = empty(boxes=False)
+    staged = replace(staged, system=staged.system.model_copy(update={"duration_s": LONG_S}))
+    return Ground(staged=staged, captured=record(_job(0), staged))
+
+
+@lru_cache(maxsize=1)
+def pictured() -> Ground:
+    """The first moments of the same drive with pictures."""
+    staged = _staged(0, PICTURES_S, FEW_COLUMNS, SIZE_PX, crowd=True)
+    return Ground(staged=staged, captured=record(_job(0), staged, by_rays(staged.rig, 0)))
+
+
+@lru_cache(maxsize=2)
+def empty(boxes: bool) -> Stage:
+    """The same drive to be measured again and again under faults that act while it is measured; without
+    people beside the lanes, and without boxes where those do not matter."""
+    staged = _staged(0, SHORT_S, FEW_COLUMNS, SIZE_PX, crowd=False)
+    if boxes:
+        return staged
+    nothing = perfect(staged.rig.rig.detector).model_copy(update={"categories": ()})
+    rig = replace(staged.rig, rig=staged.rig.rig.model_copy(update={"detector": nothing}))
+    return replace(staged, rig=rig)
+
+
+def again(staged: Stage, specs: Sequence[FaultSpec], seed: int) -> Captured:
+    """The drive measured under some faults."""
+    return record(_job(seed), replace(staged, faults=fault_set(specs)))
+
+
+def _job(seed: int) -> Job:
+    return Job(scenario=SCENARIO, system=SYSTEM, seed=seed, pipelines=())

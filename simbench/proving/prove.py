@@ -1,0 +1,208 @@
+"""The proof of one fault: honest draws match, every mutant is caught, and a higher severity is more.
+
+z of a receipt: (measured - realised) / the SD that its estimator is said to have. An estimator that counts or
+reads off what it measures errs by rounding only: such a receipt is `exact`.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from scenarios.errors import BadInput
+from scenarios.faults import FAULTS, FaultSpec, RoadShake
+from scenarios.severity import severe
+from simbench.faults.receipt import MISMATCH, OK, Receipt
+from simbench.proving.ground import measured
+from simbench.proving.mutants import Mutant, mutants
+from simbench.proving.places import Proving, place_where
+from simbench.proving.same import same
+
+LEVEL = 4  # at which mutants are tried and honest draws made
+EXACT_Z = 0.02  # an estimator whose errors scatter by less than this share of its SD does not err by chance
+FEW = 10  # draws of a mutant, and of every severity
+MOST_Z_SD = 1.25
+CAUGHT, CRASHED, MISSED, SAME = "caught", "crashed", "missed", "same"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tried:
+    """What became of a mutant. `same`: it did what the honest fault does, to the byte of what is looked at,
+    as what is applied twice does where once is for good; there is nothing to catch."""
+
+    kind: str
+    name: str
+    outcome: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Proof:
+    """Of one fault. z_mean, z_sd: of all honest receipts with an estimator that errs by chance; None where
+    all are exact. bad: honest receipts that did not match. off_draw: quantities that are drawn otherwise than
+    asked for. rises: None where a fault has no severities."""
+
+    fault: str
+    tried: tuple[Tried, ...]
+    draws: int
+    receipts: int
+    verified: int
+    bad: int
+    off_draw: tuple[str, ...]
+    z_mean: float | None
+    z_sd: float | None
+    z_n: int
+    effects: tuple[float | None, ...]
+    rises: bool | None
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        return tuple(f"{t.kind}: {t.name}" for t in self.tried if t.outcome == MISSED)
+
+    @property
+    def z_holds(self) -> bool:
+        """The mean is within 5 SD of 0, and the SD is that which the receipts publish or less: an estimator
+        may be better than it says, never worse."""
+        if self.z_mean is None or self.z_sd is None:
+            return True
+        return abs(self.z_mean) <= 5.0 * self.z_sd / np.sqrt(self.z_n) and self.z_sd <= MOST_Z_SD
+
+    @property
+    def good(self) -> bool:
+        """Everything holds."""
+        effective = self.bad == 0 and self.verified > 0 and not self.off_draw and self.rises is not False
+        return not self.missed and effective and self.z_holds
+
+
+def prove(fault: str, draws: int) -> Proof:
+    """Prove one fault by its name with so many honest draws."""
+    place, cameras = place_where(FAULTS[fault]), tuple(measured().staged.rig.cameras)
+    levels = _levels(fault)
+    spec = levels[min(LEVEL, len(levels)) - 1]
+    honest = [_honest(place, spec, seed) for seed in range(draws)]
+    found = [receipt for drawn in honest for receipt in drawn]
+    z = _zs(found)
+    effects = tuple(_effect([_honest(place, level, seed) for seed in range(FEW)]) for level in levels)
+    return Proof(
+        fault=fault,
+        tried=tuple(
+            _tried(place, mutant) for asked in _asked(spec, levels) for mutant in mutants(asked, cameras)
+        ),
+        draws=draws,
+        receipts=len(found),
+        verified=sum(r.status == OK and r.requested != 0.0 for r in found),
+        bad=sum(r.status == MISMATCH for r in found),
+        off_draw=tuple(sorted(q for q in _off_draw(honest) if _varies(honest, q))),
+        z_mean=float(z.mean()) if len(z) else None,
+        z_sd=float(z.std()) if len(z) else None,
+        z_n=len(z),
+        effects=effects,
+        rises=None if _words_mean_different_things(spec) else _rises(effects),
+    )
+
+
+def _levels(fault: str) -> tuple[FaultSpec, ...]:
+    """Severities 1 to 5; of a fault without any, its words."""
+    spec = FAULTS[fault]
+    try:
+        return tuple(severe(fault, level) for level in range(1, 6))
+    except BadInput:
+        words = spec.strength_words()
+        if not words:
+            raise
+        return tuple(spec.model_validate({spec.strength: word}) for word in words[1:])
+
+
+def _words_mean_different_things(spec: FaultSpec) -> bool:
+    """The words of a road are more and more of one thing; those of a mix-up are not."""
+    return bool(spec.strength_words()) and not isinstance(spec, RoadShake)
+
+
+def _asked(spec: FaultSpec, levels: tuple[FaultSpec, ...]) -> tuple[FaultSpec, ...]:
+    """What mutants are made of: one severity, or every word where words mean different things."""
+    return levels if _words_mean_different_things(spec) else (spec,)
+
+
+def _honest(place: Proving, spec: FaultSpec, seed: int) -> tuple[Receipt, ...]:
+    return place.look(spec, place.make((spec,), seed), seed)
+
+
+def _tried(place: Proving, mutant: Mutant) -> Tried:
+    """A mutant is caught when a receipt does not match, whether the wrong injector reports what it should
+    have drawn or what it drew. What it drew may by chance be what was asked for; then several draws together
+    tell. One that cannot act at all ends its run as an error, which is seen too."""
+    honest = place.make((mutant.honest,), 0)
+    try:
+        wrong = place.make(mutant.specs, 0)
+        if same(wrong.data, honest.data):
+            outcome = SAME
+        elif not _mismatch(place.look(mutant.honest, replace(wrong, realised=honest.realised), 0)):
+            outcome = MISSED
+        else:
+            outcome = CAUGHT if _seen(place, mutant) else MISSED
+    except Exception:  # a mutant may ask for anything: chances above 1, ranges below 0
+        outcome = CRASHED
+    return Tried(kind=mutant.kind, name=mutant.name, outcome=outcome)
+
+
+def _seen(place: Proving, mutant: Mutant) -> bool:
+    """Whether an injector that reports what it wrongly drew is seen, at once or in several draws."""
+    found = []
+    for seed in range(FEW):
+        found.append(place.look(mutant.honest, place.make(mutant.specs, seed), seed))
+        if _mismatch(found[-1]):
+            return True
+    honest = [_honest(place, mutant.honest, seed) for seed in range(FEW)]
+    return bool(_off_draw(found) - _off_draw(honest))
+
+
+def _mismatch(found: Iterable[Receipt]) -> bool:
+    return any(receipt.status == MISMATCH for receipt in found)
+
+
+def _off_draw(found: Sequence[Iterable[Receipt]]) -> frozenset[str]:
+    """Quantities whose draws, taken together, are not what was asked for: the mean of realised - requested
+    over n draws lies farther from 0 than one draw may over sqrt(n): `allowed`, or 5 SD of the draws where
+    those are more. What is rounded to whole fixes or frames the same in every draw may be among them."""
+    apart: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    for drawn in found:
+        for r in drawn:
+            apart[r.quantity].append((r.realised - r.requested, r.allowed))
+    table = {quantity: np.array(rows) for quantity, rows in apart.items()}
+    return frozenset(
+        quantity
+        for quantity, rows in table.items()
+        if abs(rows[:, 0].mean()) > max(rows[:, 1].mean(), 5.0 * rows[:, 0].std()) / np.sqrt(len(rows)) + 1e-9
+    )
+
+
+def _varies(found: Sequence[Iterable[Receipt]], quantity: str) -> bool:
+    return len({r.realised for drawn in found for r in drawn if r.quantity == quantity}) > 1
+
+
+def _zs(found: Iterable[Receipt]) -> np.ndarray:
+    """Of all quantities whose estimator errs by chance. An error that is the same in every draw (the gap
+    between two frames, say) is within its SDs or a mismatch; what a fault must leave alone is told of the
+    worst sensor only."""
+    by_quantity: dict[str, list[float]] = defaultdict(list)
+    for r in found:
+        if r.measured is not None and (r.requested, r.realised, r.allowed) != (0.0, 0.0, 0.0):
+            by_quantity[r.quantity].append((r.measured - r.realised) / r.estimator_sd)
+    errs = [z for z in by_quantity.values() if np.std(z) > EXACT_Z]
+    return np.concatenate([np.array(z) for z in errs]) if errs else np.zeros(0)
+
+
+def _effect(found: Sequence[tuple[Receipt, ...]]) -> float | None:
+    """The size of the first thing that was asked for, over some draws."""
+    first = [next((r for r in drawn if r.requested != 0.0), None) for drawn in found]
+    sizes = [abs(r.measured) for r in first if r is not None and r.measured is not None]
+    return float(np.mean(sizes)) if len(sizes) == len(found) else None
+
+
+def _rises(effects: tuple[float | None, ...]) -> bool:
+    return all(
+        weak is not None and strong is not None and weak < strong for weak, strong in pairwise(effects)
+    )
