@@ -67,7 +67,7 @@ class Made:
 def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) -> Made:
     captured = record(job, staged, picture)
     clock.lap("sensors")
-    found = receipts(captured, staged.rig, staged.faults, staged.system.duration_s)
+    found = receipts(captured, staged.rig, staged.faults, staged.system.duration_s, staged.refits)
     clock.lap("receipts")
     shake = shake_words(captured.drawn, staged.system.duration_s)
     recording = as_told(job, staged, captured.recording)

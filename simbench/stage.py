@@ -10,13 +10,15 @@ from pathlib import Path as FilePath
 from fusion.messages import CategorySize
 from scenarios.categories import CATEGORY_SIZES, SIZE_SPREAD
 from scenarios.equipment import rig_sensors
-from scenarios.errors import Where
+from scenarios.errors import BadInput, Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments
+from scenarios.faults import MotionBlur
 from scenarios.load import Family, load_scenario
 from scenarios.scenario import Scenario, System
 from simbench.calibration.file import read_calibration, told
 from simbench.capture import Captured, capture
 from simbench.case import Job, boxes_of
+from simbench.faults.refit import Refit, refit
 from simbench.plugins import reads_images
 from simbench.recording import Recording
 from simbench.sensors.detector import perfect
@@ -32,13 +34,17 @@ CATEGORIES: Mapping[str, CategorySize] = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stage:
-    """A job made concrete: the world stands, nothing has moved yet."""
+    """A job made concrete: the world stands, nothing has moved yet.
+
+    `rig` measures; `refits`: what faults made of it, one by one.
+    """
 
     scenario: Scenario
     system: System
     faults: FaultSet
     rig: SensorRig
     world: World
+    refits: tuple[Refit, ...] = ()
 
 
 def stage(job: Job) -> Stage:
@@ -74,13 +80,15 @@ def set_stage(
         raise family.where.unknown("system", system_name, family.system_names, ("systems",))
     system = scenario.system(system_name)
     declared = family.rig(system.rig)
-    rig = assemble(declared, rig_sensors(declared, family.beside))
+    built = assemble(declared, rig_sensors(declared, family.beside))
+    rig, refits = refit(built if size_px is None else resized(built, *size_px), faults)
     return Stage(
         scenario=scenario,
         system=system,
         faults=faults,
-        rig=rig if size_px is None else resized(rig, *size_px),
+        rig=rig,
         world=build_world(scenario, system, seed),
+        refits=refits,
     )
 
 
@@ -113,5 +121,7 @@ def pictures(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
     if job.images == "raycast":
         yield by_rays(staged.rig, job.seed)
         return
+    if staged.faults.get(MotionBlur) is not None:
+        raise BadInput(f"OpenGL draws one instant and cannot do {MotionBlur.name}; take --images raycast")
     with Renderer(staged.world) as renderer:
         yield by_gl(staged.rig, renderer)

@@ -21,6 +21,7 @@ from scenarios.errors import BadInput, Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments, parse_faults
 from scenarios.faults import TriggerOffset
 from scenarios.load import Family, load_scenario
+from simbench.faults.refit import refit
 from simbench.faults.struck import struck
 from simbench.faults.timing import delays_ns
 from simbench.score.frames import nearest
@@ -148,7 +149,8 @@ def timeline(
     active = own.override(parse_fault_arguments(faults)) if faults else own
     played = scenario.system(system)
     declared = family.rig(played.rig)
-    rig = assemble(declared, rig_sensors(declared, family.beside))
+    built = assemble(declared, rig_sensors(declared, family.beside))
+    rig, _ = refit(built, active)
     active.check(tuple(rig.cameras), Where(file=None))
     title = f"{scenario.name}, {system}, seed {seed}"
     return plan(rig, played.duration_s, seed, active, at_s=at_s, title=title)

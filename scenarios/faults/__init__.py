@@ -18,6 +18,7 @@ from scenarios.faults.calibration import (
     FocalLength,
     PixelShift,
 )
+from scenarios.faults.camera import MotionBlur
 from scenarios.faults.detector import EdgeError
 from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
 from scenarios.faults.spec import Cameras, FaultSpec, Sensors
@@ -56,6 +57,7 @@ __all__ = [
     "FocalLength",
     "Frozen",
     "Latency",
+    "MotionBlur",
     "PixelShift",
     "Reordered",
     "RoadEvent",

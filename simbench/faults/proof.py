@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fusion.camera import project_points
@@ -18,6 +20,7 @@ from simbench.faults.deliver import DELIVERY_FAULTS
 from simbench.faults.draw import place_of
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.receipt import Receipt
+from simbench.faults.refit import Refit, refit_receipts
 from simbench.faults.struck import struck
 from simbench.faults.tell import told_receipts
 from simbench.faults.telling import Witness
@@ -26,8 +29,10 @@ from simbench.sensors.rig import SensorRig
 from simbench.shake import Shake
 
 
-def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: float) -> tuple[Receipt, ...]:
-    """Requested, realised and measured of every fault that is on."""
+def receipts(
+    captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: float, refits: Sequence[Refit] = ()
+) -> tuple[Receipt, ...]:
+    """Requested, realised and measured of every fault that is on. `rig` is the one that measured."""
     if not faults:
         return ()
     drawn, measured = captured.drawn, captured.measured
@@ -43,6 +48,7 @@ def receipts(captured: Captured, rig: SensorRig, faults: FaultSet, duration_s: f
         result += road_fault.road_receipts(road, driven, duration_s, body, evidence)
     if (bend := faults.get(Flex)) is not None:
         result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
+    result += refit_receipts(faults, refits, rig, captured)
     witness = Witness(place=place_of(rig, captured.site.seed), evidence=evidence, body=body)
     result += told_receipts(faults, drawn.tellings, captured.recording.calibration, witness)
     if (edge_error := faults.get(EdgeError)) is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,6 +23,7 @@ from simbench.case import Job
 from simbench.faults.draw import Drawn, draw
 from simbench.faults.proof import receipts
 from simbench.faults.receipt import Receipt
+from simbench.faults.refit import refit
 from simbench.recording import Recording
 from simbench.sensors.rig import resized
 from simbench.stage import CATEGORIES, Stage, stage
@@ -62,7 +63,8 @@ def staged(
     played = whole.system
     if duration_s is not None:
         played = played.model_copy(update={"duration_s": duration_s})
-    return replace(whole, rig=rig, system=played, faults=faults(*specs))
+    rig, refits = refit(rig, faults(*specs))
+    return replace(whole, rig=rig, system=played, faults=faults(*specs), refits=refits)
 
 
 @lru_cache(maxsize=16)
@@ -141,7 +143,7 @@ def _no_returns(
 
 
 def receipts_of(captured: Captured, at: Stage) -> tuple[Receipt, ...]:
-    return receipts(captured, at.rig, at.faults, at.system.duration_s)
+    return receipts(captured, at.rig, at.faults, at.system.duration_s, at.refits)
 
 
 def drawn_for(at: Stage, seed: int = 0) -> Drawn:
