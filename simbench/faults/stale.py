@@ -19,7 +19,7 @@ from simbench.faults.flow import COUNT_SD, elsewhere
 from simbench.faults.receipt import Receipt, judge
 from simbench.faults.struck import struck
 
-NOTE = "boxes of every frame against those delivered before, and their true exposures"
+NOTE = "boxes and picture of every frame against those delivered before, and their true exposures"
 
 
 def _under(shown: Shot, now: Shot) -> Shot:
@@ -68,8 +68,8 @@ def _with(delivery: Delivery, shots: dict[str, tuple[Shot, ...]]) -> Delivery:
 def _ages(step: Step, camera: str) -> list[int] | None:
     """How many frames old what every delivered frame shows is; None where message and truth disagree.
 
-    Age by the truth: places between the exposure that this arrival had and the one that is shown. The boxes
-    must be those that the shown exposure had.
+    Age by the truth: places between the exposure that this arrival had and the one that is shown. Boxes and
+    picture must be those that the shown exposure had.
     """
     before = _in_order(step.before.shots[camera])
     place = {shot.arrival_ns: i for i, shot in enumerate(before)}
@@ -77,10 +77,19 @@ def _ages(step: Step, camera: str) -> list[int] | None:
     ages = []
     for shot in _in_order(step.after.shots[camera]):
         i, shown = place.get(shot.arrival_ns), taken.get(shot.truth.capture_ns)
-        if i is None or shown is None or shot.detections.boxes != before[shown].detections.boxes:
+        if i is None or shown is None or not _shows(shot, before[shown]):
             return None
         ages.append(i - shown)
     return ages
+
+
+def _shows(delivered: Shot, taken: Shot) -> bool:
+    """Whether one exposure has the boxes and the picture of another."""
+    if delivered.detections.boxes != taken.detections.boxes:
+        return False
+    if delivered.image is None or taken.image is None:
+        return delivered.image is taken.image
+    return np.array_equal(delivered.image.rgb, taken.image.rgb)
 
 
 def _stale_receipts(spec: StaleFrames, step: Step, site: Site) -> tuple[Receipt, ...]:
