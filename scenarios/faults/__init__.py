@@ -17,6 +17,7 @@ from scenarios.faults.calibration import (
     ClickNoise,
     FocalLength,
     PixelShift,
+    Undistorted,
 )
 from scenarios.faults.camera import MotionBlur
 from scenarios.faults.detector import EdgeError
@@ -71,6 +72,7 @@ __all__ = [
     "StampQuantum",
     "StampStep",
     "TriggerOffset",
+    "Undistorted",
     "Vibration",
 ]
 

@@ -81,6 +81,24 @@ class PixelShift(FaultSpec):
     sensors: Cameras = "cameras"
 
 
+class Undistorted(FaultSpec):
+    """The lens bends the picture, and the fusion is told that it is straight: the paper's assumption.
+
+    The lens gets a radial distortion k1 = -corner_px / (f r^3), r the slope of the farthest corner, in place
+    of what it had; pictures and boxes are as it shows them. Told is a lens without distortion, which puts a
+    point in the corner corner_px too far out. Positive is a barrel, negative a pincushion.
+    Unit: pixels at the corner. Source: judgement; 2 (a good narrow lens) to 40 (a wide one).
+    """
+
+    name: ClassVar[str] = "calibration.undistorted_px"
+    strength: ClassVar[str] = "corner_px"
+    zero_when_off: ClassVar[tuple[str, ...]] = ("corner_px",)
+    unit: ClassVar[str] = "px"
+
+    corner_px: Annotated[float, Field(ge=-500, le=500, allow_inf_nan=False)] = 0.0
+    sensors: Cameras = "cameras"
+
+
 Mixup = Literal["none", "transposed_rotation", "degrees_for_radians", "cameras_swapped", "inverse"]
 """What gets mixed up when a calibration is handed on; the first word is nothing."""
 
@@ -119,7 +137,8 @@ class ClickNoise(FaultSpec):
 
     In `boards` poses of the checkerboard, near_m to far_m from the camera and within the inner 60 % of its
     picture, each corner of the panel is clicked at its true pixel + noise_px * n (n standard normal, each
-    axis); PnP and fine tuning as in fusion.calibrate give T_told. LiDAR points and intrinsics are exact.
+    axis); PnP and fine tuning as in fusion.calibrate, with the lens that is told, give T_told. LiDAR points
+    are exact. For a lens that is told wrongly the pose makes up inside this volume, and nowhere else.
     Unit: pixels (1 SD per axis). Source: judgement; 0.5 px by an algorithm, 1 to 5 by hand.
     """
 
@@ -148,6 +167,7 @@ SPECS: tuple[type[FaultSpec], ...] = (
     ClickNoise,
     FocalLength,
     PixelShift,
+    Undistorted,
 )
 SEVERITIES: tuple[Severity, ...] = (
     Severity(
@@ -171,4 +191,9 @@ SEVERITIES: tuple[Severity, ...] = (
         source="judgement: from heat to the data sheet's rounded number",
     ),
     Severity(fault=PixelShift.name, values=(1.0, 2.0, 5.0, 10.0, 20.0), source="judgement"),
+    Severity(
+        fault=Undistorted.name,
+        values=(2.0, 5.0, 10.0, 20.0, 40.0),
+        source="judgement: from a good narrow lens to a wide one",
+    ),
 )

@@ -14,6 +14,7 @@ from scipy.special import chdtri
 
 from fusion.calibrate import LEAST_POSES, Pairs, find_extrinsics
 from fusion.calibrate_board import Board, CalibrationError
+from fusion.camera import PinholeCamera
 from fusion.geometry import Transform
 from fusion.messages import Calibration
 from scenarios.faults import ClickNoise
@@ -37,7 +38,7 @@ def clicked(spec: ClickNoise, told: Calibration, place: Place) -> Told:
     """The calibration with the poses that are found; a camera in whose zone no boards fit keeps its own."""
     poses, realised = dict(told.T_ego_sensor), dict[str, float]()
     for camera in struck(spec, place):
-        found = _error(spec, camera, place)
+        found = _error(spec, camera, told.cameras[camera], place)
         if found is None:
             realised[f"{camera} numbers"] = 0.0
             continue
@@ -50,9 +51,10 @@ def clicked(spec: ClickNoise, told: Calibration, place: Place) -> Told:
 
 
 def _error(
-    spec: ClickNoise, camera: str, place: Place
+    spec: ClickNoise, camera: str, told: PinholeCamera, place: Place
 ) -> tuple[Transform, Float64[np.ndarray, "v 4 2"]] | None:
-    """T_true_found of a camera and the clicks' noise; None where no calibration comes about."""
+    """T_true_found of a camera that is taken for `told`, and the clicks' noise; None where no calibration
+    comes about."""
     lens, true, board = place.true.cameras[camera], place.true.T_ego_sensor, Board()
     sight = Sight(
         camera=lens, T_world_camera=true[camera], T_world_lidar=true[place.lidar_name], elevation_rad=SPAN
@@ -69,7 +71,7 @@ def _error(
     at_px = np.array([lens.project(true[camera].inverse().apply(xyz)) for xyz in corners])
     lidar_m = np.array([true[place.lidar_name].inverse().apply(xyz) for xyz in corners])
     try:
-        found = find_extrinsics(Pairs(lidar_m=lidar_m, image_px=at_px + noise_px), lens)
+        found = find_extrinsics(Pairs(lidar_m=lidar_m, image_px=at_px + noise_px), told)
     except CalibrationError:
         return None
     return place.true.T_camera_lidar(camera, place.lidar_name) @ found.T_camera_lidar.inverse(), noise_px

@@ -10,11 +10,12 @@ from dataclasses import replace
 from fusion.messages import Calibration
 from scenarios.fault_set import FaultSet
 from scenarios.faults import FaultSpec
-from simbench.faults import calibration, clicks, displaced, intrinsics, mixup
+from simbench.faults import calibration, clicks, displaced, intrinsics, mixup, undistorted
 from simbench.faults.receipt import Receipt
 from simbench.faults.telling import CalibrationFault, Place, Telling, Witness
 
 CALIBRATION_FAULTS: tuple[CalibrationFault, ...] = (
+    *undistorted.TOLD,
     *clicks.TOLD,
     *calibration.TOLD,
     *displaced.TOLD,

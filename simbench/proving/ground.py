@@ -32,6 +32,8 @@ SWEEPS_S = 0.8
 SIZE_PX = (320, 200)
 DURATION_S = 6.0
 PICTURES_S = 0.5
+GLIMPSE_S = 0.4
+SMALL_PX = (160, 100)
 SHORT_S = 2.0
 LONG_S = 25.0
 FEW_COLUMNS = 8
@@ -91,7 +93,7 @@ def pictured() -> Ground:
 
 
 @lru_cache(maxsize=2)
-def empty(boxes: bool) -> Stage:
+def empty(boxes: bool = False) -> Stage:
     """The same drive to be measured again and again under faults that act while it is measured; without
     people beside the lanes, and without boxes where those do not matter."""
     staged = _staged(0, SHORT_S, FEW_COLUMNS, SIZE_PX, crowd=False)
@@ -102,9 +104,16 @@ def empty(boxes: bool) -> Stage:
     return replace(staged, rig=rig)
 
 
-def again(staged: Stage, specs: Sequence[FaultSpec], seed: int) -> Captured:
+@lru_cache(maxsize=1)
+def glimpse() -> Stage:
+    """A moment of the drive in which people beside the lanes are pictured."""
+    return _staged(0, GLIMPSE_S, FEW_COLUMNS, SMALL_PX, crowd=True)
+
+
+def again(staged: Stage, specs: Sequence[FaultSpec], seed: int, pictures: bool) -> Captured:
     """The drive measured under some faults."""
-    return record(_job(seed), replace(staged, faults=fault_set(specs)))
+    picture = by_rays(staged.rig, seed) if pictures else None
+    return record(_job(seed), replace(staged, faults=fault_set(specs)), picture)
 
 
 def _job(seed: int) -> Job:

@@ -2,25 +2,28 @@
 seed, and the receipts that look at such data.
 
 Delivery: what was measured is changed in a step. Telling: the calibration that is handed out. Drive: what is
-measured at all (time of exposure, shake, brackets, edges of boxes).
+measured at all (time of exposure, shake, brackets, edges of boxes, the sensors themselves).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-from scenarios.faults import EdgeError, FaultSpec
+from scenarios.faults import EdgeError, FaultSpec, MotionBlur
 from simbench.faults.deliver import DELIVERY_FAULTS
 from simbench.faults.draw import place_of
 from simbench.faults.fault import Site, Step
 from simbench.faults.proof import receipts as captured_receipts
 from simbench.faults.receipt import Receipt
+from simbench.faults.refit import RIG_FAULTS, Refit, refit
 from simbench.faults.tell import CALIBRATION_FAULTS
 from simbench.faults.telling import Place, Telling, Witness
-from simbench.proving.ground import Ground, again, empty, fault_set, long, measured, pictured, swept
+from simbench.proving.ground import Ground, again, empty, fault_set, glimpse, long, measured, pictured, swept
 from simbench.proving.mutants import by
+from simbench.stage import Stage
 
 GROUNDS = {"camera": pictured, "lidar": swept, "reference": long}
 """By family, where it is not the measured drive."""
@@ -50,9 +53,11 @@ def place_where(spec: type[FaultSpec]) -> Proving:
             ground = GROUNDS.get(spec.name.partition(".")[0], measured)
             return _delivery(delivered.act, delivered.receipts, ground)
     for told in CALIBRATION_FAULTS:
-        if told.spec is spec:
+        if told.spec is spec and spec not in {fault.spec for fault in RIG_FAULTS}:
             return _telling(told.tell, told.receipts)
-    return _drive(boxes=spec is EdgeError)
+    if spec is MotionBlur:
+        return _drive(glimpse, pictures=True)
+    return _drive(partial(empty, boxes=spec is EdgeError))
 
 
 def _delivery(act: Callable[..., Any], receipts: Callable[..., Any], ground: Callable[[], Ground]) -> Proving:
@@ -95,15 +100,21 @@ def _telling(tell: Callable[..., Any], receipts: Callable[..., Any]) -> Proving:
     return Proving(make=make, look=look)
 
 
-def _drive(boxes: bool) -> Proving:
+def _drive(ground: Callable[[], Stage], pictures: bool = False) -> Proving:
     def make(specs: tuple[FaultSpec, ...], seed: int) -> Made:
-        captured = again(empty(boxes), (_at_once(specs),) if specs else (), seed)
-        return Made(data=captured, realised=captured.drawn)
+        rig = ground().rig
+        for spec in specs:
+            rig, _ = refit(rig, fault_set((spec,)))
+        once = (_at_once(specs),) if specs else ()
+        captured = again(replace(ground(), rig=rig), once, seed, pictures)
+        return Made(data=(captured, rig), realised=(captured.drawn, rig))
 
     def look(spec: FaultSpec, made: Made, seed: int) -> tuple[Receipt, ...]:
-        captured = replace(made.data, drawn=made.realised)
-        staged = empty(boxes)
-        return captured_receipts(captured, staged.rig, fault_set((spec,)), staged.system.duration_s)
+        (captured, rig), (drawn, said) = made.data, made.realised
+        step = Refit(spec=spec, before=ground().rig, after=said)
+        return captured_receipts(
+            replace(captured, drawn=drawn), rig, fault_set((spec,)), captured.site.duration_s, (step,)
+        )
 
     return Proving(make=make, look=look)
 
