@@ -21,6 +21,7 @@ from simbench.faults.struck import struck
 
 PICTURES = 3  # of a camera, spread over the run
 PATCH_PX = 128
+SMALLEST_PX = 0.5
 ALIASES = 3  # what lies beyond the pixel grid's own frequencies, as often as that
 NEAR_PX = np.array([-0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2])  # trial radii about the one that is asked for
 RADIUS_SD_PX, RADIUS_SD = 0.005, 0.002  # beside what rounding leaves: aliases beyond; and of the radius
@@ -38,6 +39,17 @@ def defocus_receipts(spec: Defocus, step: Step, site: Site) -> tuple[Receipt, ..
         quantity, both = f"{name} radius of the blur", pairs(step, site, name, PICTURES)
         if not both:
             result.append(unseen(spec.name, quantity, spec.unit, spec.radius_px))
+            continue
+        if spec.radius_px <= SMALLEST_PX:
+            same = all(np.array_equal(pair.before, pair.after) for pair in both)
+            note = "a disc within a pixel changes nothing" if same else "pictures changed"
+            result.append(
+                judge(
+                    fault=spec.name, quantity=quantity, unit=spec.unit, requested=spec.radius_px,
+                    realised=step.realised[name], measured=None if same else float("nan"), estimator_sd=0.0,
+                    allowed=1e-9, note=note,
+                )
+            )  # fmt: skip
             continue
         found = [f for f in (_radius_px(pair, spec.radius_px) for pair in both) if f is not None]
         weight = np.array([sd**-2.0 for _, sd in found])
@@ -74,9 +86,8 @@ def _radius_px(pair: Pair, about_px: float) -> tuple[float, float] | None:
     trials = np.unique(np.concatenate([np.linspace(0.0, most_px, 17), about_px + NEAR_PX]))
     trials = trials[trials >= 0.0]
     best = float(trials[np.argmin([misfit(float(r)) for r in trials])])
-    slope = (blurred(best + NEAR_PX[-1]) - blurred(max(best - NEAR_PX[-1], 0.0))) / (
-        best + NEAR_PX[-1] - max(best - NEAR_PX[-1], 0.0)
-    )
+    less_px, more_px = max(best - NEAR_PX[-1], 0.0), best + NEAR_PX[-1]
+    slope = (blurred(more_px) - blurred(less_px)) / (more_px - less_px)
     power = float(np.sum(slope**2))
     if power <= 0.0:
         return None
