@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from scenarios.errors import BadInput, FieldPath, Where, show
-from scenarios.faults import FAULTS, FaultSpec, RoadShake, Vibration
+from scenarios.faults import FAULTS, FaultSpec
+from scenarios.faults.motion import SHAKERS
 from scenarios.faults.spec import Profile
 from scenarios.library import find, names, shown, user_file
 from scenarios.validate import validate
@@ -48,10 +49,12 @@ class FaultSet:
 
     def check(self, cameras: Sequence[str], where: Where) -> None:
         """BadInput: a fault names a camera that is not one of `cameras`, or two faults contradict."""
-        if self.get(RoadShake) is not None and self.get(Vibration) is not None:
+        shaking = [spec for spec in self.specs if isinstance(spec, SHAKERS)]
+        if len(shaking) > 1:
+            one, two = shaking[-2:]
             raise where.error(
-                f"{RoadShake.name} and {Vibration.name} both shake the body; switch one off, as in "
-                f"{Vibration.name}=0"
+                f"{one.name} and {two.name} both shake the body; switch one off, as in "
+                f"{two.name}={two.off_words()}"
             )
         for spec in self.specs:
             for name in spec.named_cameras:

@@ -39,7 +39,7 @@ def set_in_motion(world: World, rig: SensorRig, ego_name: str, drawn: Drawn | No
         T_ego_root=rig.T_ego_root,
         T_ego_sensor=rig.T_ego_sensor,
         body_shake=drawn.body_shake if drawn else None,
-        flex=drawn.flex if drawn else {},
+        flex=drawn.brackets if drawn else {},
     )
 
 

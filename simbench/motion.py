@@ -10,8 +10,9 @@ from jaxtyping import Float64, Int64
 
 from fusion.geometry import Transform
 from simbench.kinematics import chain
+from simbench.mount import BracketMotion
 from simbench.path import Track
-from simbench.shake import BodyShake, Shake
+from simbench.shake import BodyShake
 from simbench.world import STRIDE_HZ, STRIDE_RAD, SWAY_HZ, SWAY_RAD, Body, World
 
 FULL_SWAY_MPS = 1.0
@@ -93,8 +94,8 @@ class Motion:
 
     T_ego_root: where the carrying actor's root sits in the ego reference frame. T_ego_sensor: sensors at
     rest. body_shake: (roll, pitch, yaw in rad, heave in m) of the ego's body about `pivot_m` in the ego
-    frame; sensors ride on the body. flex: (roll, pitch, yaw in rad) of one sensor's bracket about the sensor
-    itself, axes parallel to the ego's.
+    frame; sensors ride on the body. flex: how one sensor's bracket moves against the body, (roll, pitch, yaw
+    in rad) about the sensor itself and perhaps (x, y, z in m), axes parallel to the ego's.
     """
 
     world: World
@@ -103,7 +104,7 @@ class Motion:
     T_ego_sensor: Mapping[str, Transform]
     body_shake: BodyShake | None = None
     pivot_m: tuple[float, float, float] = PIVOT_M
-    flex: Mapping[str, Shake] = field(default_factory=dict)
+    flex: Mapping[str, BracketMotion] = field(default_factory=dict)
 
     def ego(self, t_ns: Int64[np.ndarray, " n"]) -> Poses:
         """T_world_ego: follows the script, does not shake."""
@@ -127,9 +128,12 @@ class Motion:
         """T_world_sensor as it really is, shake and flex included."""
         rest = self.T_ego_sensor[sensor]
         rotation = np.broadcast_to(rest.rotation, (len(t_ns), 3, 3))
-        if sensor in self.flex:
-            rotation = rotations_rpy(self.flex[sensor].at(t_ns)) @ rotation
         position = np.broadcast_to(rest.translation_m, (len(t_ns), 3))
+        if sensor in self.flex:
+            moved = self.flex[sensor].at(t_ns)
+            rotation = rotations_rpy(moved[:, :3]) @ rotation
+            if moved.shape[1] > 3:
+                position = position + moved[:, 3:]
         return then(self.shaken_ego(t_ns), (rotation, position))
 
     def object_root(self, object_id: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:

@@ -69,7 +69,7 @@ def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) 
     clock.lap("sensors")
     found = receipts(captured, staged.rig, staged.faults, staged.system.duration_s, staged.refits)
     clock.lap("receipts")
-    shake = shake_words(captured.drawn, staged.system.duration_s)
+    shake = shake_words(captured.drawn, staged.faults, staged.system.duration_s)
     recording = as_told(job, staged, captured.recording)
     return Made(recording=recording, receipts=found, shake=shake)
 

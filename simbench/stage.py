@@ -12,13 +12,14 @@ from scenarios.categories import CATEGORY_SIZES, SIZE_SPREAD
 from scenarios.equipment import rig_sensors
 from scenarios.errors import BadInput, Where
 from scenarios.fault_set import FaultSet, parse_fault_arguments
-from scenarios.faults import MotionBlur
+from scenarios.faults import MotionBlur, Trace
 from scenarios.load import Family, load_scenario
 from scenarios.scenario import Scenario, System
 from simbench.calibration.file import read_calibration, told
 from simbench.capture import Captured, capture
 from simbench.case import Job, boxes_of
 from simbench.faults.refit import Refit, refit
+from simbench.faults.trace import trace_shake
 from simbench.plugins import reads_images
 from simbench.recording import Recording
 from simbench.sensors.detector import perfect
@@ -55,6 +56,8 @@ def stage(job: Job) -> Stage:
     staged = set_stage(family, scenario, job.system, faults, job.seed, job.size_px)
     where = Where(file=None) if job.faults else family.where.at("faults")
     faults.check(tuple(staged.rig.cameras), where)
+    if (recorded := faults.get(Trace)) is not None:
+        trace_shake(recorded, staged.system.duration_s)  # bad input is said before anything is measured
     return staged
 
 

@@ -15,13 +15,24 @@ from scenarios.faults.calibration import (
     CalibrationRotation,
     CalibrationTranslation,
     ClickNoise,
+    Drift,
     FocalLength,
     PixelShift,
     Undistorted,
 )
 from scenarios.faults.camera import MotionBlur
 from scenarios.faults.detector import EdgeError
-from scenarios.faults.motion import Flex, RoadEvent, RoadShake, Roughness, Vibration
+from scenarios.faults.motion import (
+    Flex,
+    Knock,
+    Mode,
+    RoadEvent,
+    RoadShake,
+    Roughness,
+    Spectrum,
+    Trace,
+    Vibration,
+)
 from scenarios.faults.spec import Cameras, FaultSpec, Sensors
 from scenarios.faults.timing import (
     ClockDrift,
@@ -50,6 +61,7 @@ __all__ = [
     "ClickNoise",
     "ClockDrift",
     "ClockOffset",
+    "Drift",
     "Dropped",
     "Duplicated",
     "EdgeError",
@@ -57,7 +69,9 @@ __all__ = [
     "Flex",
     "FocalLength",
     "Frozen",
+    "Knock",
     "Latency",
+    "Mode",
     "MotionBlur",
     "PixelShift",
     "Reordered",
@@ -65,12 +79,14 @@ __all__ = [
     "RoadShake",
     "Roughness",
     "Sensors",
+    "Spectrum",
     "StaleFrames",
     "StampJitter",
     "StampMeaning",
     "StampOnSave",
     "StampQuantum",
     "StampStep",
+    "Trace",
     "TriggerOffset",
     "Undistorted",
     "Vibration",

@@ -48,6 +48,27 @@ class CalibrationTranslation(FaultSpec):
     sensors: Sensors = "cameras"
 
 
+class Drift(FaultSpec):
+    """A camera's mount creeps away from where it was calibrated, evenly over the run.
+
+    At time t of a run of length T the bracket is turned by angle_deg t / T about an axis of the ego, and
+    shifted by shift_cm t / T along one. The fusion is told the pose at time 0 for good.
+    Unit: degrees at the end of the run. Source: judgement; heat and loose screws, in minutes rather than
+    seconds: short runs show the end of it.
+    """
+
+    name: ClassVar[str] = "calibration.drift_deg"
+    strength: ClassVar[str] = "angle_deg"
+    zero_when_off: ClassVar[tuple[str, ...]] = ("angle_deg", "shift_cm")
+    unit: ClassVar[str] = "deg"
+
+    angle_deg: Annotated[float, Field(ge=-30, le=30, allow_inf_nan=False)] = 0.0
+    axis: Literal["roll", "pitch", "yaw"] = "yaw"
+    shift_cm: Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)] = 0.0
+    along: Literal["x", "y", "z"] = "y"
+    sensors: Cameras = "cameras"
+
+
 class FocalLength(FaultSpec):
     """The fusion is told a focal length that is off: f_told = f_true * (1 + percent / 100), both axes.
 
@@ -165,6 +186,7 @@ SPECS: tuple[type[FaultSpec], ...] = (
     CalibrationRotation,
     CalibrationTranslation,
     ClickNoise,
+    Drift,
     FocalLength,
     PixelShift,
     Undistorted,
@@ -184,6 +206,11 @@ SEVERITIES: tuple[Severity, ...] = (
         fault=ClickNoise.name,
         values=(0.5, 1.0, 2.0, 3.0, 5.0),
         source="judgement: from corners found by an algorithm to hurried clicks",
+    ),
+    Severity(
+        fault=Drift.name,
+        values=(0.1, 0.25, 0.5, 1.0, 2.0),
+        source="as a rotation that was told wrongly",
     ),
     Severity(
         fault=FocalLength.name,

@@ -53,6 +53,14 @@ class FaultSpec(Spec):
         annotation = cls.model_fields[cls.strength].annotation
         return tuple(get_args(annotation)) if get_origin(annotation) is Literal else ()
 
+    @classmethod
+    def off_words(cls) -> str:
+        """How to say on the command line that a fault is off."""
+        words = cls.strength_words()
+        if words:
+            return words[0]
+        return "0" if cls.strength in cls.zero_when_off else f"{{{cls.zero_when_off[0]}: 0}}"
+
     @property
     def is_off(self) -> bool:
         """Whether this spec does nothing."""

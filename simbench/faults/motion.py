@@ -74,7 +74,7 @@ def shake_sizes(shake: BodyShake, band_hz: tuple[float, float], duration_s: floa
     )
 
 
-def _mode(
+def mode_density(
     frequency_hz: Float64[np.ndarray, " k"], mode: tuple[float, float, float]
 ) -> Float64[np.ndarray, " k"]:
     natural, damping, share = mode
@@ -94,7 +94,8 @@ def body_shake(spec: Vibration, profile: Profile, duration_s: float, seed: int) 
     noise = noise / np.trapezoid(noise, frequency)
     density = np.stack(
         [
-            (1.0 - BAND_NOISE_SHARE) * sum(_mode(frequency, m) for m in modes) + BAND_NOISE_SHARE * noise
+            (1.0 - BAND_NOISE_SHARE) * sum(mode_density(frequency, m) for m in modes)
+            + BAND_NOISE_SHARE * noise
             for modes in MODES[profile]
         ]
     )
@@ -114,35 +115,40 @@ def bracket_shake(spec: Flex, camera: str, duration_s: float, seed: int) -> Shak
     rng = stream(seed, "fault", FLEX, camera)
     edges = np.geomspace(0.5 * low, 2.0 * high, LINES + 1)
     frequency = edges[:-1] + np.diff(edges) * rng.uniform(0.0, 1.0, LINES)
-    density = np.stack([_mode(frequency, (rng.uniform(low, high), 0.05, 1.0)) for _ in range(3)])
+    density = np.stack([mode_density(frequency, (rng.uniform(low, high), 0.05, 1.0)) for _ in range(3)])
     return draw_shake(rng, frequency, density, np.full(3, np.deg2rad(spec.rms_deg)), duration_s)
 
 
-def vibration_receipts(
-    spec: Vibration,
-    realised: Shake | None,
+def shake_receipts(
+    fault: str,
+    asked_rms: Float64[np.ndarray, "4"],
+    realised: BodyShake | None,
     duration_s: float,
     body: BodyAttitude | None,
     evidence: Sequence[CameraEvidence],
+    *,
+    allowed: float = 0.01,
 ) -> tuple[Receipt, ...]:
-    """What was asked for, drawn and found of roll, pitch, yaw and heave, wherever one was asked for."""
-    asked = requested_rms(spec) * TO_DEG_AND_M
+    """What was asked for (RMS of roll, pitch, yaw in rad and heave in m), drawn and found, wherever something
+    was asked for or drawn. allowed: share of the request by which the draw may differ."""
+    asked = asked_rms * TO_DEG_AND_M
+    least = 1e-6 * float(asked.max())  # what is left of an axis by rounding was not asked for
     drawn = drawn_rms(realised, duration_s)
     found = found_rms(realised, duration_s, body, evidence)
     return tuple(
         judge(
-            fault=VIBRATION,
+            fault=fault,
             quantity=f"{name} RMS",
             unit=unit,
             requested=float(asked[axis]),
             realised=float(drawn[axis]),
             measured=found[axis][0],
             estimator_sd=float(found[axis][1]),
-            allowed=0.01 * float(asked[axis]),
+            allowed=allowed * float(asked[axis]),
             note=note,
         )
         for axis, (name, unit, note) in enumerate(AXES)
-        if asked[axis] > 0.0
+        if max(asked[axis], drawn[axis]) > least
     )
 
 

@@ -2,31 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fusion.camera import project_points
 from fusion.geometry import rotation_log
 from scenarios.fault_set import FaultSet
-from scenarios.faults import EdgeError, Flex, RoadShake, TriggerOffset, Vibration
+from scenarios.faults import Drift, EdgeError, Flex, Knock, TriggerOffset
 from simbench.capture import Captured
-from simbench.dynamics.ride import Ride
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
-from simbench.faults import road as road_fault
 from simbench.faults import timing as timing_fault
+from simbench.faults.body import shaking
 from simbench.faults.deliver import DELIVERY_FAULTS
-from simbench.faults.draw import place_of
+from simbench.faults.draw import Drawn, place_of
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
+from simbench.faults.mounts import drift_receipts, knock_receipts, settled
 from simbench.faults.receipt import Receipt
 from simbench.faults.refit import Refit, refit_receipts
 from simbench.faults.struck import struck
 from simbench.faults.tell import told_receipts
 from simbench.faults.telling import Witness
+from simbench.mount import BracketMotion
 from simbench.sensors import fiducials
 from simbench.sensors.rig import SensorRig
-from simbench.shake import Shake
 
 
 def receipts(
@@ -36,18 +37,26 @@ def receipts(
     if not faults:
         return ()
     drawn, measured = captured.drawn, captured.measured
-    evidence, body = _evidence(captured, rig), _body(captured, rig)
+    seen, body = _evidence(captured, rig), _body(captured, rig)
+    evidence = tuple(_settled(item, drawn) for item in seen)
     result: list[Receipt] = []
     if (offset := faults.get(TriggerOffset)) is not None:
         result += timing_fault.receipts(offset, struck(offset, rig), drawn.delays_ns, evidence, body)
-    if (vibration := faults.get(Vibration)) is not None:
-        scripted = drawn.body_shake if isinstance(drawn.body_shake, Shake) else None
-        result += motion_fault.vibration_receipts(vibration, scripted, duration_s, body, evidence)
-    if (road := faults.get(RoadShake)) is not None:
-        driven = drawn.body_shake if isinstance(drawn.body_shake, Ride) else None
-        result += road_fault.road_receipts(road, driven, duration_s, body, evidence)
+    if (shaken := shaking(faults)) is not None:
+        fault, spec = shaken
+        result += fault.receipts(spec, drawn.body_shake, duration_s, body, evidence)
     if (bend := faults.get(Flex)) is not None:
         result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
+    if (knock := faults.get(Knock)) is not None:
+        rest = _rest(drawn.flex, drawn.drifts)
+        result += knock_receipts(
+            knock, struck(knock, rig), drawn.knocks, seen, drawn.body_shake, rest, duration_s
+        )
+    if (drift := faults.get(Drift)) is not None:
+        rest = _rest(drawn.flex, drawn.knocks)
+        result += drift_receipts(
+            drift, struck(drift, rig), drawn.drifts, seen, drawn.body_shake, rest, duration_s
+        )
     result += refit_receipts(faults, refits, rig, captured)
     witness = Witness(place=place_of(rig, captured.site.seed), evidence=evidence, body=body)
     result += told_receipts(faults, drawn.tellings, captured.recording.calibration, witness)
@@ -63,6 +72,24 @@ def receipts(
     for step in captured.steps:
         result += entries[type(step.spec)].receipts(step.spec, step, captured.site)
     return tuple(result)
+
+
+def _settled(item: CameraEvidence, drawn: Drawn) -> CameraEvidence:
+    """A camera's evidence less the knock and the drift of its bracket, which have receipts of their own."""
+    found = [motions[item.camera] for motions in (drawn.knocks, drawn.drifts) if item.camera in motions]
+    if not found:
+        return item
+    turn_rad, shift_m = settled(item, found)
+    return replace(item, turn_rad=turn_rad, shift_m=shift_m)
+
+
+def _rest(*drawn: Mapping[str, BracketMotion]) -> dict[str, list[BracketMotion]]:
+    """Several motions of each bracket, side by side."""
+    rest: dict[str, list[BracketMotion]] = {}
+    for motions in drawn:
+        for name, motion in motions.items():
+            rest.setdefault(name, []).append(motion)
+    return rest
 
 
 def _body(captured: Captured, rig: SensorRig) -> BodyAttitude | None:

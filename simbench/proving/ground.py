@@ -7,14 +7,20 @@ and do not need many.
 
 from __future__ import annotations
 
+import atexit
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
 
 from scenarios.fault_set import FaultSet
 from scenarios.faults import FaultSpec
 from simbench.capture import Captured
 from simbench.case import Job
+from simbench.faults import trace
 from simbench.sensors.detector import perfect
 from simbench.sensors.pictures import by_rays
 from simbench.stage import Stage, record, stage
@@ -108,6 +114,20 @@ def empty(boxes: bool = False) -> Stage:
 def glimpse() -> Stage:
     """A moment of the drive in which people beside the lanes are pictured."""
     return _staged(0, GLIMPSE_S, FEW_COLUMNS, SMALL_PX, crowd=True)
+
+
+@lru_cache(maxsize=1)
+def a_trace() -> str:
+    """A file of a gyro on a body that rolls and pitches, for as long as this process lives."""
+    folder = tempfile.TemporaryDirectory(prefix="simbench-trace-")
+    atexit.register(folder.cleanup)
+    t_s = np.arange(0.0, SHORT_S + 0.02, 0.01)
+    roll, pitch = 0.03 * np.cos(9.0 * t_s) + 0.01, 0.06 * np.cos(7.0 * t_s + 1.0)
+    rows = np.stack([t_s, roll, pitch, 0.02 * np.sin(4.0 * t_s)], axis=1)
+    lines = [",".join(trace.COLUMNS), *(",".join(f"{value:.9g}" for value in row) for row in rows)]
+    path = Path(folder.name) / "gyro.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return str(path)
 
 
 def again(staged: Stage, specs: Sequence[FaultSpec], seed: int, pictures: bool) -> Captured:

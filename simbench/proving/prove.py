@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 
 from scenarios.errors import BadInput
-from scenarios.faults import FAULTS, FaultSpec, RoadShake
+from scenarios.faults import FAULTS, FaultSpec, RoadShake, Trace
 from scenarios.severity import severe
 from simbench.faults.receipt import MISMATCH, OK, Receipt
-from simbench.proving.ground import measured
+from simbench.proving.ground import a_trace, measured
 from simbench.proving.mutants import Mutant, mutants
 from simbench.proving.places import Proving, place_where
 from simbench.proving.same import same
@@ -80,7 +80,7 @@ class Proof:
 def prove(fault: str, draws: int) -> Proof:
     """Prove one fault by its name with so many honest draws."""
     place, cameras = place_where(FAULTS[fault]), tuple(measured().staged.rig.cameras)
-    levels = _levels(fault)
+    levels = levels_of(fault)
     spec = levels[min(LEVEL, len(levels)) - 1]
     honest = [_honest(place, spec, seed) for seed in range(draws)]
     found = [receipt for drawn in honest for receipt in drawn]
@@ -104,9 +104,11 @@ def prove(fault: str, draws: int) -> Proof:
     )
 
 
-def _levels(fault: str) -> tuple[FaultSpec, ...]:
-    """Severities 1 to 5; of a fault without any, its words."""
+def levels_of(fault: str) -> tuple[FaultSpec, ...]:
+    """Severities 1 to 5; of a fault without any, its words, or a recorded trace more and more."""
     spec = FAULTS[fault]
+    if spec is Trace:
+        return tuple(Trace(file=a_trace(), scale=scale) for scale in (0.25, 0.5, 1.0, 2.0, 4.0))
     try:
         return tuple(severe(fault, level) for level in range(1, 6))
     except BadInput:

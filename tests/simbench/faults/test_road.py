@@ -218,7 +218,7 @@ def test_a_fall_is_bad_input_in_one_sentence() -> None:
     ],
 )
 def test_a_ride_is_told_in_words(which: str, says: str) -> None:
-    words = shake_words(honest(which), 1.5)
+    words = shake_words(honest(which), scene(which).faults, 1.5)
     assert words.endswith(says)
     for part in ("pitch 0.", "deg RMS (", "deg/s)", "roll ", "heave ", " mm, ", " Hz: "):
         assert part in words
