@@ -28,6 +28,8 @@ STRAIGHT = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 def bend(spec: Undistorted, rig: SensorRig) -> SensorRig:
     """The rig with lenses that distort, in place of what distortion they had."""
+    if spec.is_off:
+        return rig
     cameras, pinholes = dict(rig.cameras), dict(rig.pinholes)
     for name in struck(spec, rig):
         if name not in cameras:  # refused elsewhere, with its place in the file
@@ -42,6 +44,8 @@ def bend(spec: Undistorted, rig: SensorRig) -> SensorRig:
 
 def straightened(spec: Undistorted, told: Calibration, place: Place) -> Told:
     """The calibration without distortion."""
+    if spec.is_off:
+        return Told(calibration=told, realised={})
     names = struck(spec, place)
     straight = {name: replace(told.cameras[name], distortion=STRAIGHT) for name in names}
     return Told(

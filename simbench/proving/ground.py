@@ -40,6 +40,7 @@ DURATION_S = 6.0
 PICTURES_S = 0.5
 GLIMPSE_S = 0.4
 SMALL_PX = (160, 100)
+LARGE_PX = (960, 600)
 SHORT_S = 2.0
 LONG_S = 25.0
 FEW_COLUMNS = 8
@@ -102,7 +103,7 @@ def pictured() -> Ground:
 def empty(boxes: bool = False) -> Stage:
     """The same drive to be measured again and again under faults that act while it is measured; without
     people beside the lanes, and without boxes where those do not matter."""
-    staged = _staged(0, SHORT_S, FEW_COLUMNS, SIZE_PX, crowd=False)
+    staged = _staged(0, SHORT_S, FEW_COLUMNS, LARGE_PX, crowd=False)
     if boxes:
         return staged
     nothing = perfect(staged.rig.rig.detector).model_copy(update={"categories": ()})
