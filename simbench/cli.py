@@ -273,6 +273,7 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
 
     from simbench import results as result_files
     from simbench.campaign import run_jobs
+    from simbench.canary import canary
     from simbench.environment import environment
     from simbench.files import prepare_folder
     from simbench.formats.kitti import is_recorded
@@ -303,8 +304,11 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
     else:
         _print_summary(found)
         click.echo(f"report: {page}")
+    blind = canary() if simulated else None
+    if blind:
+        click.echo(f"simbench: {blind}", err=True)
     statuses = {case.status for result in found for case in result.cases}
-    if statuses & {"bench_error", "receipt_mismatch"}:
+    if blind or statuses & {"bench_error", "receipt_mismatch"}:
         raise SystemExit(BENCH_ERROR)
     if statuses - {"ok"}:
         raise SystemExit(FAILED)

@@ -79,7 +79,7 @@ def _guarded(
 ) -> JobResult:
     try:
         made = make()
-        cases, views, curves = _score(job, made, _others(scenario, job.system), clock)
+        cases, views, curves = judge(job, made, _others(scenario, job.system), clock)
         return JobResult(
             job=job, scenario=scenario, faults=faults, shake=made.shake, receipts=made.receipts, cases=cases,
             views=views, distances=curves, timings_s=clock.laps,
@@ -98,9 +98,11 @@ def _others(scenario: Scenario | RecordedScene, system: str) -> tuple[str, ...]:
     return tuple(name for name in played.actors if name != played.ego)
 
 
-def _score(
+def judge(
     job: Job, made: Made, others: tuple[str, ...], clock: Clock
 ) -> tuple[tuple[Case, ...], tuple[PairView, ...], Distances]:
+    """All pipelines and the oracle on a recording: no scores where a receipt does not match. `others`: whose
+    distances are kept."""
     cases = [run_case(name, made) for name in job.pipelines]
     clock.lap("fusion and scores")
     if made.recording.truth.target_id is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from fusion.camera import project_points
 from fusion.geometry import rotation_log
 from scenarios.fault_set import FaultSet
-from scenarios.faults import Drift, EdgeError, Flex, Knock, TriggerOffset
+from scenarios.faults import Drift, EdgeError, FaultSpec, Flex, Knock, TriggerOffset
 from simbench.capture import Captured
 from simbench.faults import detector as detector_fault
 from simbench.faults import motion as motion_fault
@@ -20,7 +20,7 @@ from simbench.faults.deliver import DELIVERY_FAULTS
 from simbench.faults.draw import Drawn, place_of
 from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
 from simbench.faults.mounts import drift_receipts, knock_receipts, settled
-from simbench.faults.receipt import Receipt
+from simbench.faults.receipt import Receipt, judge
 from simbench.faults.refit import Refit, refit_receipts
 from simbench.faults.struck import struck
 from simbench.faults.tell import told_receipts
@@ -71,7 +71,17 @@ def receipts(
     entries = {fault.spec: fault for fault in DELIVERY_FAULTS}
     for step in captured.steps:
         result += entries[type(step.spec)].receipts(step.spec, step, captured.site)
+    proved = {receipt.fault for receipt in result}
+    result += [_nothing_measured(spec) for spec in faults if spec.name not in proved]
     return tuple(result)
+
+
+def _nothing_measured(spec: FaultSpec) -> Receipt:
+    """A fault that no receipt speaks of never acted."""
+    return judge(
+        fault=spec.name, quantity="effect", unit="share", requested=1.0, realised=0.0, measured=None,
+        estimator_sd=0.0, allowed=0.0, note="no step of this fault was taken: nothing to measure",
+    )  # fmt: skip
 
 
 def _settled(item: CameraEvidence, drawn: Drawn) -> CameraEvidence:
