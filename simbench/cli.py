@@ -1,4 +1,5 @@
-"""The command line: `simbench demo | run | stress | calibrate | list | describe | timeline | doctor | learn`.
+"""The command line: `simbench demo | run | stress | frontier | calibrate | list | describe | timeline |
+doctor | learn`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
@@ -13,6 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
+
+from simbench.commands.frontier import frontier
 
 if TYPE_CHECKING:
     from simbench.case import Boxes, Images, Job, JobResult
@@ -647,6 +650,9 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
     prepare_folder(out.parent)
     write_text(out, learn_shapes(seeds))
     click.echo(f"wrote {out}")
+
+
+main.add_command(frontier)
 
 
 if __name__ == "__main__":

@@ -22,8 +22,9 @@ def mean_curve(levels: Float64[np.ndarray, " k"], margins: Float64[np.ndarray, "
     n = margins.shape[1]
     y = margins.mean(axis=1)
     rough = _roughness(levels, margins) / n
-    scale = max(float(y.std()), float(np.sqrt(rough.mean())), TINY)
-    prior = priors(scale=scale, constant=10.0 * scale + float(np.abs(y).max()), slope=3.0 * scale)
+    far = float(np.abs(y).max())
+    scale = max(float(y.std()), float(np.sqrt(rough.mean())), 0.01 * far, TINY)
+    prior = priors(scale=scale, constant=10.0 * scale + far, slope=3.0 * scale)
     noise = rough + 1e-6 * scale**2
     among = prior.among(levels) + np.diag(noise)
     root = np.linalg.cholesky(among)

@@ -49,22 +49,23 @@ Point = tuple[Value, ...]
 """A value for every axis, in their order."""
 
 
-def parse_axes(arguments: Sequence[str]) -> tuple[Axis, ...]:
-    """The axes that the values of `--vary` ask for. BadInput: malformed, unknown, out of range, or twice."""
-    axes = tuple(_parse(argument.strip()) for argument in arguments)
+def parse_axes(arguments: Sequence[str], option: str = OPTION) -> tuple[Axis, ...]:
+    """The axes that the values of `--vary` ask for (of `option`, when it is another's). BadInput: malformed,
+    unknown, out of range, or twice."""
+    axes = tuple(_parse(argument.strip(), option) for argument in arguments)
     names = [axis.name for axis in axes]
     for name in names:
         if names.count(name) > 1:
-            raise Where(file=OPTION).error(f"{name} is varied twice")
+            raise Where(file=option).error(f"{name} is varied twice")
     return axes
 
 
-def _parse(argument: str) -> Axis:
-    where = Where(file=OPTION)
+def _parse(argument: str, option: str) -> Axis:
+    where = Where(file=option)
     name, equals, text = (part.strip() for part in argument.partition("="))
     if not equals or not name or not text:
         raise where.error(f"is NAME=LOW:HIGH:COUNT or NAME=A,B,C; this is {show(argument)}")
-    fault, path = _what(name)
+    fault, path = _what(name, where)
     values, spread = _values(name, text, where)
     if fault is not None:
         for value in values:
@@ -72,12 +73,11 @@ def _parse(argument: str) -> Axis:
     return Axis(name=name, fault=fault, path=path, values=values, spread=spread)
 
 
-def _what(name: str) -> tuple[str | None, str]:
+def _what(name: str, where: Where) -> tuple[str | None, str]:
     """The fault and its field, or None and a path in the scenario file."""
     if name in FAULTS:
         return name, FAULTS[name].strength
     fault, _, field = name.rpartition(".")
-    where = Where(file=OPTION)
     if fault in FAULTS:
         if field not in FAULTS[fault].model_fields:
             raise where.unknown("field", field, tuple(FAULTS[fault].model_fields), (fault,))
@@ -117,7 +117,7 @@ def _number(text: str, name: str, where: Where) -> float:
 
 
 def _word(text: str, name: str, where: Where) -> Value:
-    value = parse_yaml(text.strip(), f"{OPTION} {name}").data
+    value = parse_yaml(text.strip(), f"{where.file} {name}").data
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise where.error(f"{name}: {show(value)} is neither a number nor a word")
     return value if isinstance(value, str) else float(value)

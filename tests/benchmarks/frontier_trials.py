@@ -49,14 +49,14 @@ class Bench:
         own = np.cos(TURN * x) * self.parts[0] + np.sin(TURN * x) * self.parts[1]
         alone = np.stack([self._alone(level) for level in levels])
         scatter = np.sqrt(1.0 - ALONE) * own + np.sqrt(ALONE) * alone
-        return np.asarray(CURVES[self.curve](x) + SD * scatter)
+        return CURVES[self.curve](x) + SD * np.asarray(scatter)
 
     def measure(self, levels: Sequence[float]) -> Sequence[Margins]:
         return [{QUESTION: row.tolist()} for row in self.values(levels) - LIMIT]
 
     def _alone(self, level: float) -> Float64[np.ndarray, " n"]:
         rng = stream(self.seed, "frontier", "alone", f"{level:.6g}")
-        return rng.normal(size=self.parts.shape[1])
+        return np.asarray(rng.normal(size=self.parts.shape[1]))
 
 
 def bench(curve: str, trial: int, runs: int) -> Bench:
