@@ -67,8 +67,8 @@ def run_frontier(
             stage(job)
     prepare_folder(out)
     about = {
-        "scenarios": [family.name], "system": template.system, "seeds": list(seeds), "faults": list(faults),
-        "changes": list(changes), "boxes": boxes or "model",
+        "scenarios": [family.name], "system": template.system, "seeds": _ranges(seeds),
+        "faults": list(faults), "changes": list(changes), "boxes": boxes or "model",
     }  # fmt: skip
     begun, found, statuses, count = time.perf_counter(), [], set[str](), 0
     for axis in parsed:
@@ -117,6 +117,17 @@ def parse_along(arguments: Sequence[str]) -> tuple[Axis, ...]:
         if axis.ends[0] < 0.0:
             raise where.error(f"{axis.name} begins below 0: a frontier goes up from no error, as in 0:HIGH")
     return axes
+
+
+def _ranges(seeds: Sequence[int]) -> str:
+    """Seeds as `--seeds` takes them: 0-19 or 0-3,7."""
+    parts: list[list[int]] = []
+    for seed in sorted(seeds):
+        if parts and seed == parts[-1][1] + 1:
+            parts[-1][1] = seed
+        else:
+            parts.append([seed, seed])
+    return ",".join(str(a) if a == b else f"{a}-{b}" for a, b in parts)
 
 
 def _tell(item: Requirement) -> None:

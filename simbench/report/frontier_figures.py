@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 from markupsafe import Markup
-from scipy.special import expit, logit, ndtr, ndtri
+from scipy.special import betaincinv, expit, logit, ndtr, ndtri
 
 from simbench.frontier.curve import GRID
 from simbench.frontier.requirements import Requirement
@@ -25,7 +25,9 @@ def strip(item: Requirement) -> Markup:
     def draw(figure: Any) -> None:
         plot = figure.subplots()
         if answer.factors is not None:
-            below, above = (shown(item, curve.margin - factor * error) for factor in answer.factors)
+            below, above = _within_counts(
+                item, *(shown(item, curve.margin - factor * error) for factor in answer.factors)
+            )
             plot.fill_between(place, below, above, color=palette.METHOD, alpha=0.15, lw=0)
         plot.plot(place, shown(item, curve.margin), color=palette.METHOD, lw=1.6)
         if item.goal.functional == "mean":
@@ -50,6 +52,23 @@ def strip(item: Requirement) -> Markup:
         grid(plot)
 
     return as_svg(560, 210, item.sentence, draw)
+
+
+def _within_counts(
+    item: Requirement, below: Float64[np.ndarray, " m"], above: Float64[np.ndarray, " m"]
+) -> tuple[Float64[np.ndarray, " m"], Float64[np.ndarray, " m"]]:
+    """A band of shares no wider than what was counted at the levels says by itself (Clopper-Pearson, 95 %):
+    where all runs keep a limit, the band of the curve alone is far too wide."""
+    if item.goal.functional == "mean":
+        return below, above
+    met = (item.found.margins >= 0.0).sum(axis=1).astype(np.float64)
+    n = item.found.margins.shape[1]
+    least = np.where(met > 0, betaincinv(np.maximum(met, 1.0), n - met + 1.0, 0.025), 0.0)
+    most = np.where(met < n, betaincinv(met + 1.0, np.maximum(n - met, 1.0), 0.975), 1.0)
+    return (
+        np.maximum(below, np.interp(GRID, item.found.levels, least)),
+        np.minimum(above, np.interp(GRID, item.found.levels, most)),
+    )
 
 
 def shown(item: Requirement, margin: Float64[np.ndarray, "*m"]) -> Float64[np.ndarray, "*m"]:

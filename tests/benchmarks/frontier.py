@@ -58,7 +58,7 @@ def covered(answer: Answer, true: float | None) -> tuple[bool, bool]:
     return bound, low <= end and (high is None or (true is not None and true <= high))
 
 
-def row_of(curve: str, functional: Functional, runs: int, trials: int) -> Row:
+def row_of(curve: str, functional: Functional, runs: int, trials: int, grids: Sequence[int] = DENSE) -> Row:
     true = truth(curve, functional)
     end = 1.0 if true is None else true
     found = [trial_of(curve, Goal(functional=functional), trial, runs) for trial in range(trials)]
@@ -66,12 +66,12 @@ def row_of(curve: str, functional: Functional, runs: int, trials: int) -> Row:
     error = _rms([(1.0 if a.best is None else a.best) - end for a, _ in found])
     dense = None
     if true is not None:
-        for count in DENSE:
-            grids = [
+        for count in grids:
+            errors = [
                 on_a_grid(curve, functional, trial, runs, count) - end
                 for trial in range(min(trials, DENSE_TRIALS))
             ]
-            if _rms(grids) <= error:
+            if _rms(errors) <= error:
                 dense = count
                 break
     return Row(
