@@ -28,6 +28,8 @@ def start_levels(count: int = START) -> tuple[float, ...]:
 
 def next_level(levels: Float64[np.ndarray, " k"], curve: Curve) -> float | None:
     """The level to measure next; None where another one would tell little. levels: rising."""
+    if curve.margin[0] < 0.0:  # broken at the start: there is no crossing to look for
+        return None
     error = np.maximum(curve.error, 1e-12)
     beyond = first_below(curve.margin + BAND * error)
     chances = ndtr(-np.abs(curve.margin) / error)

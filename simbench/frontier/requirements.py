@@ -78,7 +78,7 @@ class Requirement:
         n, least = len(self.seeds), self.goal.share
         if n < MIN_RUNS:
             return f"n = {n} run{'' if n == 1 else 's'}: illustration"
-        if self.goal.functional == "mean" or n >= runs_for(least):
+        if self.goal.functional == "mean" or n >= runs_for(least) or self.found.answer.broken_at_start:
             return None
         needed = f"{least:g} takes {runs_for(least)}"
         if self.all_kept:
