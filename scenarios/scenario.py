@@ -309,6 +309,7 @@ class LidarSensor(Spec):
     merge_m: NonNegative = 0.0  # parts of a return nearer to each other than this are one return
     dropout_rate: Annotated[float, Field(ge=0, le=1)] = 0.0  # share of returns lost whatever their strength
     latency_ms: NonNegative  # from the last firing to the delivery
+    rolling: bool = True  # False: all beams fire in the middle of the turn, as no spinning LiDAR does
     off: tuple[LidarEffect, ...] = ()
     source: str
 

@@ -42,6 +42,7 @@ class Job:
     frames: tuple[int, int] | None = None
     changes: tuple[str, ...] = ()  # of the scenario file, as `--set` gives them
     calibration: str = "true"  # as `--calibration` gives it
+    off: tuple[str, ...] = ()  # what the bench leaves out (`switches.py`)
     found_in: str | None = None  # the file of the found calibration that the pipelines are told
 
     @property

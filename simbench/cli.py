@@ -175,6 +175,10 @@ def demo(
     "--set", "changes", multiple=True, metavar="PATH=VALUE",
     help="Replaces a value of the scenario file, as systems.car.duration_s=3. May be repeated.",
 )  # fmt: skip
+@click.option(
+    "--off", "off", multiple=True, metavar="NAME",
+    help="Leave a part of the bench out: bench.rolling_scan, bench.spin_phase, bench.reference_rate.",
+)  # fmt: skip
 @click.option("--alone", is_flag=True, help="Leave out the same drives with errors off.")
 @click.option(
     "--boxes", type=click.Choice(["labels", "model"]), default=None,
@@ -192,7 +196,7 @@ def demo(
 @_common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
-    changes: tuple[str, ...], alone: bool,
+    changes: tuple[str, ...], off: tuple[str, ...], alone: bool,
     boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...],
     images: Images, jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
 ) -> None:  # fmt: skip
@@ -223,6 +227,8 @@ def run(
     planned = []
     if recorded and changes:
         raise click.UsageError("--set is for simulated drives: what was recorded has happened")
+    if recorded and off:
+        raise click.UsageError("--off is for simulated drives: what was recorded has happened")
     if recorded and calibration != "true":
         raise click.UsageError("--calibration is for simulated drives: recorded data bring their own")
     if recorded:
@@ -248,7 +254,7 @@ def run(
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
                     images=images, size_px=size, boxes=boxes, changes=changes, calibration=calibration,
-                    found_in=found_in,
+                    found_in=found_in, off=tuple(dict.fromkeys(off)),
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:

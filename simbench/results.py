@@ -67,6 +67,8 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
         words += ["--set", text]
     if job.faults != ("none",):
         words.append("--alone")  # this case only, not the same drive with errors off
+    for text in job.off:
+        words += ["--off", text]
     if job.boxes is not None:
         words += ["--boxes", job.boxes]
     if job.frames is not None:
@@ -116,6 +118,7 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
         "why": case.why,
         "scenario_sha256": scenario_hash(result),
         "fault_specs": result.faults.as_data(),
+        "off": list(result.job.off),
         "shake": result.shake,
         "receipts": [dataclasses.asdict(receipt) for receipt in result.receipts],
         "boxes": boxes_of(result.job, not isinstance(result.scenario, Scenario)),

@@ -26,6 +26,7 @@ from simbench.sensors.detector import perfect
 from simbench.sensors.pictures import TakePicture, by_gl, by_rays
 from simbench.sensors.render import Renderer
 from simbench.sensors.rig import SensorRig, assemble, resized
+from simbench.switches import check_switches, scored_without, switched
 from simbench.world import World, build_world
 
 CATEGORIES: Mapping[str, CategorySize] = {
@@ -50,6 +51,7 @@ class Stage:
 
 def stage(job: Job) -> Stage:
     """Resolve scenario, faults and rig of a job and build its world. Raises BadInput."""
+    check_switches(job.off)
     family = load_scenario(job.scenario, job.changes)
     scenario = family.resolve(job.seed)
     faults = faults_of(job, family, scenario)
@@ -58,7 +60,7 @@ def stage(job: Job) -> Stage:
     faults.check(tuple(staged.rig.cameras), where)
     if (recorded := faults.get(Trace)) is not None:
         trace_shake(recorded, staged.system.duration_s)  # bad input is said before anything is measured
-    return staged
+    return replace(staged, rig=switched(staged.rig, job.off)) if job.off else staged
 
 
 def faults_of(job: Job, family: Family, scenario: Scenario) -> FaultSet:
@@ -101,7 +103,8 @@ def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captu
     if boxes_of(job, recorded=False) == "labels":
         declared = rig.rig.model_copy(update={"detector": perfect(rig.rig.detector)})
         rig = replace(rig, rig=declared)
-    return capture(staged.system, rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+    captured = capture(staged.system, rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+    return replace(captured, recording=scored_without(captured.recording, job.off)) if job.off else captured
 
 
 def as_told(job: Job, staged: Stage, recording: Recording) -> Recording:

@@ -26,8 +26,8 @@ from simbench.faults.struck import struck
 from simbench.faults.timing import delays_ns
 from simbench.score.frames import nearest
 from simbench.sensors.clock import CameraTiming, ticks_ns
-from simbench.sensors.lidar import beam_table, passing_offset_ns, period_ns
-from simbench.sensors.rig import SensorRig, assemble
+from simbench.sensors.lidar import beam_table, period_ns
+from simbench.sensors.rig import SensorRig, assemble, axis_deg, fire_offset_ns
 
 SWEEPS_SHOWN = 2
 CROSSING_MPS = 5.0  # a target that crosses the camera's axis at this speed
@@ -182,21 +182,6 @@ def plan(
         cameras=tuple(_exposures(name, rig, timing[name], seed, faults, start_ns) for name in rig.cameras),
         ticks=_ticks(rig, seed, rig.end_ns(duration_s, timing)),
     )
-
-
-def axis_deg(rig: SensorRig, camera: str) -> float:
-    """The azimuth of a camera's axis in the LiDAR's frame, -180 to 180."""
-    R_ego_lidar = rig.T_ego_sensor[rig.lidar_name].rotation
-    forward = R_ego_lidar.T @ rig.T_ego_sensor[camera].rotation[:, 2]
-    return float(np.rad2deg(np.arctan2(forward[1], forward[0])))
-
-
-def fire_offset_ns(rig: SensorRig, azimuth_deg: float) -> int:
-    """When, after the start of a sweep, the LiDAR fires the columns that look along an azimuth of its frame
-    (mean over the beams)."""
-    columns_ns = beam_table(rig.lidar).fire_offset_ns.mean(axis=1)
-    gap_ns = np.abs(columns_ns - passing_offset_ns(rig.lidar, azimuth_deg))
-    return round(float(columns_ns[np.argmin(np.minimum(gap_ns, period_ns(rig.lidar) - gap_ns))]))
 
 
 def _exposures(

@@ -16,5 +16,7 @@ def compress(spec: JpegLoss, delivery: Delivery, site: Site) -> Acted:
     if spec.is_off:
         return Acted(delivery=delivery, realised=realised)
     quality = 100 - int(spec.loss)
+    if not 0 <= quality <= 100:
+        raise ValueError(f"there is no JPEG of quality {quality}")
     after = each_picture(spec, delivery, site, lambda _, seq, picture: jpeg(picture, quality))
     return Acted(delivery=after, realised=realised)

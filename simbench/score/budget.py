@@ -32,7 +32,15 @@ from simbench.recording import Recording
 from simbench.score.frames import Frame
 from simbench.score.localization import FrameScore
 from simbench.score.metrics import BUDGET_AXES, BUDGET_PARTS, Estimate, mean_of, null
-from simbench.score.pairs import EligiblePair, held_fix, lidar_to_world, median_point, poses_at, to_child
+from simbench.score.pairs import (
+    EligiblePair,
+    held_fix,
+    held_position,
+    lidar_to_world,
+    median_point,
+    poses_at,
+    to_child,
+)
 
 PARTS = tuple(part for part in BUDGET_PARTS if part != "total")
 
@@ -94,7 +102,7 @@ def error_budget(
         position = np.array(score.raw.position_ego_m)
         used.append(score.frame)
         rows.append(_parts(recording, frames[score.frame], pair, position, stamp, fix))
-        totals.append(position - truth.reference.position_ego_m[fix])
+        totals.append(position - held_position(truth, fix, score.raw.stamp_ns)[0])
     return Budget(
         frames=tuple(used),
         parts_m={part: readonly(np.array([r[part] for r in rows]).reshape(-1, 3)) for part in PARTS},
@@ -125,7 +133,7 @@ def _parts(
     centre_stamp = truth.target_centre_ego_m(stamp_ns)[0]
     return {
         "surface_to_centre": q_ego - centre_fire,
-        "reference_lag": centre_stamp - reference.centre_ego_m[fix],
+        "reference_lag": centre_stamp - held_position(truth, fix, int(stamp_ns[0]))[1],
         "lever_arm": -reference.lever_m[fix],
         "heading": -reference.heading_m[fix],
         "reference_noise": -reference.noise_m[fix],

@@ -36,7 +36,7 @@ from simbench.score.metrics import (
     mean_of,
     null,
 )
-from simbench.score.pairs import EligiblePair, held_fix, planar_range_m
+from simbench.score.pairs import EligiblePair, held_fix, held_position, planar_range_m
 from simbench.truth import Truth
 
 DERIVATIVE_NS = 5_000_000  # half the step of the central difference for true speeds
@@ -93,7 +93,10 @@ def fixes(truth: Truth, stamps_ns: Sequence[int], positions_ego_m: Sequence[np.n
     held: list[Vector | None] = [None] * len(t_ns)
     if truth.reference is not None:
         rows = held_fix(truth.reference, t_ns)
-        held = [None if r < 0 else _vector(truth.reference.position_ego_m[r]) for r in rows]
+        held = [
+            None if row < 0 else _vector(held_position(truth, int(row), int(t))[0])
+            for row, t in zip(rows, t_ns, strict=True)
+        ]
     return tuple(
         Fix(
             stamp_ns=int(t_ns[i]),

@@ -115,6 +115,20 @@ def held_fix(reference: GnssReference, t_ns: Int64[np.ndarray, " n"]) -> Int64[n
     return np.where(at >= 0, order[np.maximum(at, 0)], -1) if len(order) else np.full(len(t_ns), -1)
 
 
+def held_position(
+    truth: Truth, fix: int, t_ns: int
+) -> tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]]:
+    """What the reference says at t_ns by the fix that holds then: the target's position [m, ego frame], and the
+    true centre in it. The fix itself, or (`GnssReference.held` False) carried along by the true motion since."""
+    reference = truth.reference
+    assert reference is not None
+    position, centre = reference.position_ego_m[fix], reference.centre_ego_m[fix]
+    if reference.held:
+        return position, centre
+    now = truth.target_centre_ego_m(np.array([t_ns], dtype=np.int64))[0]
+    return position + (now - centre), now
+
+
 def eligible_pairs(recording: Recording, frames: Sequence[Frame]) -> tuple[EligiblePair, ...]:
     """All eligible pairs, by frame and then camera name; empty without a target."""
     truth = recording.truth
@@ -174,7 +188,7 @@ def _distances(truth: Truth, lidar: str, t_ns: int) -> tuple[float, float | None
     fix = int(held_fix(truth.reference, at)[0])
     if fix < 0:
         return centre_m, None
-    return centre_m, float(planar_range_m(truth.reference.position_ego_m[fix] - origin))
+    return centre_m, float(planar_range_m(held_position(truth, fix, t_ns)[0] - origin))
 
 
 @lru_cache(maxsize=1)

@@ -21,7 +21,8 @@ class BeamTable:
     are a *group*, g = column * i + instant; `slots` lists them from the lowest slope up (a short row repeats
     its last beam), and beam b is number `place[b]` of its column's instant `instant[b]`. `fans`: one fan per
     group, for the ray kernel. base, along_azimuth, along_elevation [i k 3]: a beam's direction and its change
-    per radian of either angle in its fan's frame (forward at the encoder's angle, up, left).
+    per radian of either angle in its fan's frame (forward at the encoder's angle, up, left). last_offset_ns:
+    when the turn ends with its last firing, also of a scan that is not rolling.
     """
 
     direction: Float64[np.ndarray, "c b 3"]
@@ -32,6 +33,7 @@ class BeamTable:
     place: Int64[np.ndarray, " b"]
     column_offset_ns: Int64[np.ndarray, " c"]
     group_offset_ns: Int64[np.ndarray, " g"]
+    last_offset_ns: int
     fans: rays.Fans
     base: Float64[np.ndarray, "i k 3"]
     along_azimuth: Float64[np.ndarray, "i k 3"]
@@ -69,6 +71,10 @@ def beam_table(sensor: LidarSensor) -> BeamTable:
     )
     azimuth = encoder + offset
 
+    last_ns = int(start_ns[-1] + delay_ns.max())
+    if not sensor.rolling:
+        start_ns, delay_ns = _at_once_ns(sensor, delay_ns)
+
     base, by_azimuth, by_elevation = _in_fan(offset, elevation)
     slope, skew = base[:, 1] / base[:, 0], base[:, 2] / base[:, 0]
     slots = _slots(delay_ns, slope)
@@ -92,6 +98,7 @@ def beam_table(sensor: LidarSensor) -> BeamTable:
         place=readonly(place),
         column_offset_ns=readonly(start_ns, np.int64),
         group_offset_ns=readonly((start_ns[:, None] + delay_ns[first]).reshape(-1), np.int64),
+        last_offset_ns=last_ns,
         fans=rays.make_fans(
             frame=frame,
             slope=np.tile(slope[slots], (sensor.columns, 1)),
@@ -104,6 +111,16 @@ def beam_table(sensor: LidarSensor) -> BeamTable:
         along_azimuth=readonly(by_azimuth[slots]),
         along_elevation=readonly(by_elevation[slots]),
     )
+
+
+def _at_once_ns(
+    sensor: LidarSensor, delay_ns: Int64[np.ndarray, " b"]
+) -> tuple[Int64[np.ndarray, " c"], Int64[np.ndarray, " b"]]:
+    """Starts of the columns and delays of the beams of a scan that does not roll: in the order of a turning one,
+    1 ns apart, around the middle of the turn."""
+    instants, rank = np.unique(delay_ns, return_inverse=True)
+    column = np.arange(sensor.columns, dtype=np.int64) - sensor.columns // 2
+    return period_ns(sensor) // 2 + len(instants) * column, rank.astype(np.int64)
 
 
 def passing_offset_ns(sensor: LidarSensor, azimuth_deg: float) -> int:

@@ -76,7 +76,7 @@ def sweep(
         sensor=name,
         seq=seq,
         stamp_ns=start_ns,
-        arrival_ns=int(shot.instant_ns[-1]) + round(sensor.latency_ms * 1e6),
+        arrival_ns=start_ns + table.last_offset_ns + round(sensor.latency_ms * 1e6),
         xyz_m=points.xyz_m,
         intensity=points.intensity,
         offset_ns=points.offset_ns.astype(np.int32),

@@ -14,7 +14,7 @@ from scenarios.scenario import CameraSensor, GnssSensor, ImuSensor, LidarSensor,
 from scenarios.seeding import stream
 from simbench.axes import T_parent_body, T_parent_optical, pinhole
 from simbench.sensors.clock import CameraTiming, camera_timing, drawn_ns
-from simbench.sensors.lidar import passing_offset_ns, period_ns
+from simbench.sensors.lidar import beam_table, passing_offset_ns, period_ns
 
 TRAILING_SWEEPS = 3  # cameras and IMU go on after the last sweep, so that late messages still settle it
 BEYOND_NS = 300_000_000  # and so much longer GNSS and IMU
@@ -34,6 +34,8 @@ class SensorRig:
     """The sensors of a rig. Poses are in the ego frame at rest; `pinholes` are the true intrinsics.
 
     trigger_deg: the spin angle (LiDAR frame) that fires each triggered camera, the rig's pulse or its own.
+    in_phase: whatever fires them, all cameras are in the middle of an exposure when the scan fires along their
+    axes (`switches.py`).
     """
 
     rig: Rig
@@ -48,6 +50,7 @@ class SensorRig:
     imu: ImuSensor | None
     T_ego_sensor: Mapping[str, Transform]
     T_ego_root: Transform
+    in_phase: bool = False
 
     @property
     def calibration(self) -> Calibration:
@@ -65,7 +68,11 @@ class SensorRig:
         """Exposures of one camera over the run, and a few more."""
         sensor, period = self.cameras[camera], period_ns(self.lidar)
         run_ns = self.sweeps(duration_s) * period
-        if sensor.trigger == "free_run":
+        if self.in_phase:
+            open_ns, readout_ns = round(sensor.exposure_ms * 1e6), round(sensor.readout_ms * 1e6)
+            first_ns = fire_offset_ns(self, axis_deg(self, camera)) - (open_ns + readout_ns) // 2
+            period //= max(round(sensor.rate_hz / self.lidar.rate_hz), 1)
+        elif sensor.trigger == "free_run":
             first_ns = drawn_ns(sensor.phase_ms, stream(seed, "camera", camera, "phase"))
             period = round(1e9 / sensor.rate_hz)
         else:
@@ -91,6 +98,22 @@ class SensorRig:
             imu_ns=drawn(imu.phase_ms, "imu") if imu is not None else 0,
             odometer_ns=drawn(imu.odometer_phase_ms, "odometer") if imu is not None else 0,
         )
+
+
+def axis_deg(rig: SensorRig, camera: str) -> float:
+    """The azimuth of a camera's axis in the LiDAR's frame, -180 to 180."""
+    R_ego_lidar = rig.T_ego_sensor[rig.lidar_name].rotation
+    forward = R_ego_lidar.T @ rig.T_ego_sensor[camera].rotation[:, 2]
+    return float(np.rad2deg(np.arctan2(forward[1], forward[0])))
+
+
+def fire_offset_ns(rig: SensorRig, azimuth_deg: float) -> int:
+    """When, after the start of a sweep, the LiDAR fires the columns that look along an azimuth of its frame
+    (mean over the beams)."""
+    turning = beam_table(rig.lidar.model_copy(update={"rolling": True})).fire_offset_ns.mean(axis=1)
+    gap_ns = np.abs(turning - passing_offset_ns(rig.lidar, azimuth_deg))
+    at = np.argmin(np.minimum(gap_ns, period_ns(rig.lidar) - gap_ns))
+    return round(float(beam_table(rig.lidar).fire_offset_ns.mean(axis=1)[at]))
 
 
 def assemble(rig: Rig, sensors: Mapping[str, Sensor]) -> SensorRig:
