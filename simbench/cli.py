@@ -1,4 +1,4 @@
-"""The command line: `simbench demo | run | stress | frontier | calibrate | list | describe | timeline |
+"""The command line: `simbench demo | run | stress | frontier | explain | calibrate | list | describe | timeline |
 doctor | learn`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
 
 if TYPE_CHECKING:
@@ -658,6 +659,7 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
     click.echo(f"wrote {out}")
 
 
+main.add_command(explain)
 main.add_command(frontier)
 
 

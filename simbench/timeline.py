@@ -233,7 +233,7 @@ def _ticks(rig: SensorRig, seed: int, end_ns: int) -> tuple[Ticks, ...]:
 def _of_run(folder: Path, system: str | None, seed: int | None) -> tuple[Family, str, int, FaultSet]:
     """The first case of a run with faults, or else the first, of that system and seed."""
     where = Where(file=str(folder / "result.json"))
-    cases = _cases(folder, where)
+    cases = cases_of_run(folder)
     fitting = [case for case in cases if system in (None, case["system"]) and seed in (None, case["seed"])]
     if not fitting:
         had = sorted({f"{case['system']} seed {case['seed']}" for case in cases})
@@ -245,7 +245,9 @@ def _of_run(folder: Path, system: str | None, seed: int | None) -> tuple[Family,
     return family, case["system"], case["seed"], faults
 
 
-def _cases(folder: Path, where: Where) -> list[dict[str, Any]]:
+def cases_of_run(folder: Path) -> list[dict[str, Any]]:
+    """The cases in a run's `result.json`. BadInput: the folder holds none."""
+    where = Where(file=str(folder / "result.json"))
     kinds = {"scenario": str, "system": str, "seed": int, "faults": str, "fault_specs": dict}
     try:
         content = json.loads((folder / "result.json").read_text(encoding="utf-8"))

@@ -91,9 +91,9 @@ class ImageTruth:
 class GnssReference:
     """The paper's 5 Hz reference: the target relative to the ego, in the ego frame, by fix [m].
 
-    A fix holds from its `available_ns` on. `position_ego_m` = `centre_ego_m` (exact, at `fix_ns`) + `lever_m`
-    + `heading_m` + `noise_m`, each [m 3]: the parts of the error budget. held: False where a fix does not just
-    hold, but goes along with the target's true motion since (`score.pairs.held_position`).
+    A fix holds from its `available_ns` on. `position_ego_m` = `centre_ego_m` (exact, at `fix_ns`) +
+    `lever_m` + `heading_m` + `noise_m`, each [m 3]: the parts of the error budget. held: False where a fix
+    does not just hold, but goes along with the target's true motion since (`score.pairs.held_position`).
     """
 
     fix_ns: Int64[np.ndarray, " m"]

@@ -1,12 +1,13 @@
 """From a table of values to what each cause cost: dividends and Shapley values with their intervals, what is
 named as a cause, and when nothing is.
 
-All numbers are losses: higher is worse (of precision, clean minus now; of an error in metres, now minus clean).
-An effect below zero is a gain, and is shown so.
+All numbers are losses: higher is worse (of precision, clean minus now; of an error in metres, now minus
+clean). An effect below zero is a gain, and is shown so.
 
 A run without a value, with whatever causes, is left out of that metric whole, for the runs are compared with
-themselves; it is counted and told. Then "no cause" is not said: what could not be measured may be the effect. Before
-that, a pipeline that failed counts as precision 0 and as gross error in every frame (it has no metres to count).
+themselves; it is counted and told. Then "no cause" is not said: what could not be measured may be the
+effect. Before that, a pipeline that failed counts as precision 0 and as gross error in every frame (it has
+no metres to count).
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ Verdict = Literal["caused", "no cause", "undecided"]
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """What a set of causes adds to the loss. summary: over runs, with its own 95 % interval; together: its
-    interval among all dividends at once, which decides whether it `counts`; share: of the total, where that
-    is sure not to be zero. se: of sampling, where it was sampled."""
+    interval among all dividends and the total at once, which decides whether it `counts`; share: of the
+    total, where that is sure not to be zero. se: of sampling, where it was sampled."""
 
     causes: tuple[str, ...]
     summary: Summary
@@ -44,9 +45,9 @@ class Effect:
 
 @dataclass(frozen=True, kw_only=True)
 class Attribution:
-    """One metric of one pipeline. dividends: of every set whose value is known, by size; remainder: of all sets of
-    three and more, None where there are none. named: the dividends that count, largest first; the remainder
-    (no causes of its own) among them only where its sets were not taken apart. left_out: seeds."""
+    """One metric of one pipeline. dividends: of every set whose value is known, by size; remainder: of all
+    sets of three and more, None where there are none. named: the dividends that count, largest first; the
+    remainder (no causes of its own) among them only where its sets were not taken apart. left_out: seeds."""
 
     pipeline: str
     metric: str
@@ -70,7 +71,8 @@ def attribute(
     pipeline: str = "",
     metric: str = "",
 ) -> Attribution:
-    """Of a whole table: row S the loss with the set S of causes, NaN without a value; a column is a seed's run."""
+    """Of a whole table: row S the loss with the set S of causes, NaN without a value; a column is a seed's
+    run."""
     if causes_in(len(losses)) != len(names):
         raise ValueError(f"{len(losses)} rows do not fit {len(names)} causes")
     has = np.isfinite(losses).all(axis=0)
@@ -96,8 +98,8 @@ def attribute_sampled(
     pipeline: str = "",
     metric: str = "",
 ) -> Attribution:
-    """Of many causes. small: the losses of all sets up to two (`up_to(k, 2)`), complete; whole: with all causes;
-    seeds: those that were asked for, `left_out` of them without a value somewhere."""
+    """Of many causes. small: the losses of all sets up to two (`up_to(k, 2)`), complete; whole: with all
+    causes; seeds: those that were asked for, `left_out` of them without a value somewhere."""
     masks = up_to(len(names), 2)
     at = {mask: small[i] for i, mask in enumerate(masks)}
     rows: dict[int, np.ndarray] = {}
@@ -139,51 +141,52 @@ def _told(
         rng = stream(0, "explain", pipeline, metric, *what)
         return summarize(dict(zip(ran, values.tolist(), strict=True)), rng)
 
-    total = over_runs(whole - clean, "total")
-    sure = total.ci95 is not None and total.mean and not total.ci95[0] <= 0.0 <= total.ci95[1]
-
-    def effect(of: tuple[str, ...], values: np.ndarray, what: str) -> Effect:
-        summary = over_runs(values, what, *of)
-        share = summary.mean / total.mean if sure and summary.mean is not None and total.mean else None
-        return Effect(causes=of, summary=summary, share=share)
-
-    decisive = [row for _, row in taken] + ([above] if above is not None and above_decides else [])
+    total = whole - clean
+    decisive = [*(row for _, row in taken), total]
+    if above is not None and above_decides:
+        decisive.append(above)
     bounds, counts = _together(np.array(decisive).reshape(len(decisive), len(ran)), pipeline, metric)
-    effects = [effect(of, row, "dividend") for of, row in taken]
-    left = None if above is None else effect((), above, "remainder")
-    if left is not None and above_decides:
-        effects.append(left)
-    effects = [
-        Effect(causes=e.causes, summary=e.summary, share=e.share, together=bounds[i], counts=counts[i])
-        for i, e in enumerate(effects)
-    ]
-    if left is not None and above_decides:
-        left = effects.pop()
+    cost = over_runs(total, "total")
+    sure = cost.ci95 is not None and not cost.ci95[0] <= 0.0 <= cost.ci95[1]
+
+    def effect(
+        of: tuple[str, ...], values: np.ndarray, what: str, at: int | None = None, se: float | None = None
+    ) -> Effect:
+        """`at`: its place among those that decide."""
+        summary = over_runs(values, what, *of)
+        return Effect(
+            causes=of,
+            summary=summary,
+            together=None if at is None else bounds[at],
+            counts=at is not None and counts[at],
+            share=summary.mean / cost.mean if sure and cost.mean and summary.mean is not None else None,
+            sampling_se=se,
+        )
+
+    effects = tuple(effect(of, row, "dividend", i) for i, (of, row) in enumerate(taken))
+    last = len(decisive) - 1
+    left = None if above is None else effect((), above, "remainder", last if above_decides else None)
+    named = [e for e in (*effects, *(() if left is None else (left,))) if e.counts]
     left_out = tuple(seed for seed in seeds if seed not in ran)
-    named = [e for e in (*effects, *([left] if left is not None else [])) if e.counts]
-    named.sort(key=lambda e: -abs(e.summary.mean or 0.0))
-    verdict, why = _verdict(len(ran), left_out, bool(named))
+    verdict, why = _verdict(len(ran), left_out, bool(named), counts[len(taken)])
     return Attribution(
         pipeline=pipeline,
         metric=metric,
         clean=over_runs(clean, "clean"),
         whole=over_runs(whole, "whole"),
-        total=Effect(causes=tuple(names), summary=total),
-        dividends=tuple(effects),
+        total=Effect(
+            causes=tuple(names), summary=cost, together=bounds[len(taken)], counts=counts[len(taken)]
+        ),
+        dividends=effects,
         remainder=left,
         shapley=tuple(
-            _sampled(effect((name,), row, "shapley"), se)
-            for name, (row, se) in zip(names, phi, strict=True)
+            effect((name,), row, "shapley", se=se) for name, (row, se) in zip(names, phi, strict=True)
         ),
         left_out=left_out,
-        named=tuple(named),
+        named=tuple(sorted(named, key=lambda e: -abs(e.summary.mean or 0.0))),
         verdict=verdict,
         why=why,
     )
-
-
-def _sampled(effect: Effect, se: float | None) -> Effect:
-    return Effect(causes=effect.causes, summary=effect.summary, share=effect.share, sampling_se=se)
 
 
 def _together(
@@ -203,11 +206,16 @@ def _together(
     return bounds, [bool(found) for found in exceeds(t_values(effects), c)]
 
 
-def _verdict(runs: int, left_out: Sequence[int], any_named: bool) -> tuple[Verdict, str]:
+def _verdict(runs: int, left_out: Sequence[int], any_named: bool, total_counts: bool) -> tuple[Verdict, str]:
     if runs < MIN_RUNS:
         return "undecided", f"{runs} runs with a value everywhere: at least {MIN_RUNS} are needed"
     if any_named:
         return "caused", ""
+    if total_counts:
+        return (
+            "undecided",
+            f"all causes together cost or gain, but no set of them is beyond chance in {runs} runs",
+        )
     if left_out:
         return "undecided", f"{len(left_out)} runs have no value somewhere, which may be an effect"
     return "no cause", f"no effect is beyond chance in {runs} runs"

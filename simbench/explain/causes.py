@@ -1,8 +1,8 @@
-"""What may be to blame: every fault of a run, and what the bench itself does (`switches.py`); and the run with
-only some of them.
+"""What may be to blame: every fault of a run, and what the bench itself does (`switches.py`); and the run
+with only some of them.
 
-A cause that is off is as if it had never been mentioned; the others keep every one of their draws, because each
-draws from a stream of its own. So the runs of one seed differ by their causes alone.
+A cause that is off is as if it had never been mentioned; the others keep every one of their draws, because
+each draws from a stream of its own. So the runs of one seed differ by their causes alone.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ OPTION = "--cause"
 
 @dataclass(frozen=True, kw_only=True)
 class Question:
-    """What is explained. `whole`: by seed, the run with every cause on; its faults are spelt out one by one after
-    'none'. causes: those that are switched, in order; all else stays as it is."""
+    """What is explained. `whole`: by seed, the run with every cause on; its faults are spelt out one by one
+    after 'none'. causes: those that are switched, in order; all else stays as it is."""
 
     title: str
     whole: Mapping[int, Job]
@@ -84,10 +84,9 @@ def question_of_scenario(
     )
 
 
-def causes_of(
-    sets: Iterable[FaultSet], off: Sequence[str], chosen: Sequence[str]
-) -> tuple[str, ...]:
-    """All causes of runs with these faults where `off` is off already, or those `chosen` among them. BadInput."""
+def causes_of(sets: Iterable[FaultSet], off: Sequence[str], chosen: Sequence[str]) -> tuple[str, ...]:
+    """All causes of runs with these faults where `off` is off already, or those `chosen` among them.
+    BadInput."""
     found = sorted({spec.name for faults in sets for spec in faults})
     known = (*found, *(name for name in SWITCHES if name not in off))
     for name in chosen:

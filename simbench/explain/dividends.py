@@ -2,9 +2,10 @@
 
     d(S) = sum over T within S of (-1)^(|S| - |T|) v(T)        v(S) = sum over T within S of d(T)
 
-d of one cause is its effect alone on a clean run, d of a pair what the two do together beyond the sum of both,
-and so on; all together they are the total, v(all) - v(none). The Shapley value of a cause is its share of every
-set that it is in, phi(i) = sum over S with i of d(S) / |S|; the values of all causes add up to the total too.
+d of one cause is its effect alone on a clean run, d of a pair what the two do together beyond the sum of
+both, and so on; all together they are the total, v(all) - v(none). The Shapley value of a cause is its share
+of every set that it is in, phi(i) = sum over S with i of d(S) / |S|; the values of all causes add up to the
+total too.
 
 Sets are bit masks: cause i is bit 1 << i. Tables are [2^k r], row S the values of set S, a column a run.
 Harsanyi 1963; Shapley 1953.

@@ -1,16 +1,16 @@
 """Many effects at once: how far from zero the farthest of them gets by chance alone.
 
-t of an effect is its mean over runs by its standard error. If no cause did anything, every run's effects would as
-well have the other sign: flip the signs of whole runs, all effects of a run together, and look how large the
-largest |t| gets. Its 95 % quantile is the limit c; the intervals mean ± c SE hold for all effects together, and an
-effect whose interval excludes zero is a cause.
+t of an effect is its mean over runs by its standard error. If no cause did anything, every run's effects
+would as well have the other sign: flip the signs of whole runs, all effects of a run together, and look how
+large the largest |t| gets. Its 95 % quantile is the limit c; the intervals mean ± c SE hold for all effects
+together, and an effect whose interval excludes zero is a cause.
 
-This is the wild bootstrap over runs with the null imposed (Cameron, Gelbach & Miller 2008) and the largest |t|
-(Westfall & Young 1993). Why so: effects of one table share their clean run and hang together, which the flips keep
-and Bonferroni would pay for; it is exact where effects are symmetric by chance, also with 6 runs, where resampled
-runs are too few (a resample of ten runs of which one shows an effect has no spread in a third of the cases); and
-the limit over all effects is no lower than that over those without a cause, so it also guards the others when some
-are real. Every pattern of signs is taken up to 12 runs, else random ones.
+This is the wild bootstrap over runs with the null imposed (Cameron, Gelbach & Miller 2008) and the largest
+|t| (Westfall & Young 1993). Why so: effects of one table share their clean run and hang together, which the
+flips keep and Bonferroni would pay for; it is exact where effects are symmetric by chance, also with 6 runs,
+where resampled runs are too few (a resample of ten runs of which one shows an effect has no spread in a
+third of the cases); and the limit over all effects is no lower than that over those without a cause, so it
+also guards the others when some are real. Every pattern of signs is taken up to 12 runs, else random ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ SLACK = 1e-9  # t that are equal but for rounding count as equal
 
 
 def t_values(effects: Float64[np.ndarray, "m n"]) -> Float64[np.ndarray, " m"]:
-    """Mean by standard error over n runs; 0 where all is zero, infinite where all runs agree on something else."""
+    """Mean by standard error over n runs; 0 where all is zero, infinite where all runs agree on something
+    else."""
     n = effects.shape[1]
     return _t(effects.mean(axis=1), (effects**2).sum(axis=1), n)
 

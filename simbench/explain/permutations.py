@@ -1,10 +1,10 @@
 """Shapley values of many causes by antithetic permutation sampling.
 
 Switch the causes on one by one in a random order: what the value changes when i comes is i's marginal
-contribution, and its mean over all orders is phi(i). Every order is followed by its reverse: where i came early
-in one it comes late in the other, and the mean of the two varies less (Castro et al. 2009; Mitchell et al. 2022).
-The error that the sampling itself makes is the SD of these means over pairs of orders, over the root of their
-number.
+contribution, and its mean over all orders is phi(i). Every order is followed by its reverse: where i came
+early in one it comes late in the other, and the mean of the two varies less (Castro et al. 2009; Mitchell et
+al. 2022). The error that the sampling itself makes is the SD of these means over pairs of orders, over the
+root of their number.
 """
 
 from __future__ import annotations

@@ -118,8 +118,9 @@ def held_fix(reference: GnssReference, t_ns: Int64[np.ndarray, " n"]) -> Int64[n
 def held_position(
     truth: Truth, fix: int, t_ns: int
 ) -> tuple[Float64[np.ndarray, " 3"], Float64[np.ndarray, " 3"]]:
-    """What the reference says at t_ns by the fix that holds then: the target's position [m, ego frame], and the
-    true centre in it. The fix itself, or (`GnssReference.held` False) carried along by the true motion since."""
+    """What the reference says at t_ns by the fix that holds then: the target's position [m, ego frame], and
+    the true centre in it. The fix itself, or (`GnssReference.held` False) carried along by the true motion
+    since."""
     reference = truth.reference
     assert reference is not None
     position, centre = reference.position_ego_m[fix], reference.centre_ego_m[fix]

@@ -116,8 +116,8 @@ def beam_table(sensor: LidarSensor) -> BeamTable:
 def _at_once_ns(
     sensor: LidarSensor, delay_ns: Int64[np.ndarray, " b"]
 ) -> tuple[Int64[np.ndarray, " c"], Int64[np.ndarray, " b"]]:
-    """Starts of the columns and delays of the beams of a scan that does not roll: in the order of a turning one,
-    1 ns apart, around the middle of the turn."""
+    """Starts of the columns and delays of the beams of a scan that does not roll: in the order of a turning
+    one, 1 ns apart, around the middle of the turn."""
     instants, rank = np.unique(delay_ns, return_inverse=True)
     column = np.arange(sensor.columns, dtype=np.int64) - sensor.columns // 2
     return period_ns(sensor) // 2 + len(instants) * column, rank.astype(np.int64)

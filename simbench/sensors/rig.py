@@ -34,8 +34,8 @@ class SensorRig:
     """The sensors of a rig. Poses are in the ego frame at rest; `pinholes` are the true intrinsics.
 
     trigger_deg: the spin angle (LiDAR frame) that fires each triggered camera, the rig's pulse or its own.
-    in_phase: whatever fires them, all cameras are in the middle of an exposure when the scan fires along their
-    axes (`switches.py`).
+    in_phase: whatever fires them, all cameras are in the middle of an exposure when the scan fires along
+    their axes (`switches.py`).
     """
 
     rig: Rig

@@ -1,0 +1,150 @@
+"""The whole answer: every metric of every pipeline taken apart, and the error budgets without and with all
+causes.
+
+Up to six causes every set of them is measured. With more, all sets of up to two and all causes together (the
+dividends of singles and pairs stay exact, all above is the remainder), and Shapley values are sampled
+(`permutations.py`) until their error is below 2 % of every total that is sure not to be zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from scenarios.seeding import stream
+from simbench.case import ORACLE
+from simbench.explain.attribution import Attribution, attribute, attribute_sampled
+from simbench.explain.dividends import up_to
+from simbench.explain.permutations import MIN_PAIRS, MOST_PAIRS, Order, Sampled, orders, prefixes, sampled
+from simbench.explain.values import METRICS, Measured
+from simbench.score.metrics import BUDGET_AXES, BUDGET_PARTS
+from simbench.score.statistics import Summary, summarize
+
+MOST_EXACT = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class BudgetRow:
+    """A part of the error budget along an axis, signed, mean over runs: without the causes and with all."""
+
+    pipeline: str
+    axis: str
+    part: str
+    clean: Summary
+    whole: Summary
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """attributions: by pipeline, then metric. pairs: of orders that Shapley values were sampled with; None:
+    exact. reached: whether the sampling error is as small as wanted."""
+
+    attributions: tuple[Attribution, ...]
+    budget: tuple[BudgetRow, ...]
+    pairs: int | None
+    reached: bool
+
+
+def answer(measured: Measured, told: Callable[[Sequence[int]], None] = lambda _: None) -> Answer:
+    """Measure what is needed and take it apart. `told` hears of every batch of sets before it is measured."""
+    k = len(measured.question.causes)
+    everything = range(1 << k)
+
+    def measure(masks: Sequence[int]) -> None:
+        told(masks)
+        measured.measure(masks)
+
+    if k <= MOST_EXACT:
+        measure(everything)
+        return _answer(measured, tuple(_exact(measured)), None, True)
+    small = up_to(k, 2)
+    measure((*small, everything[-1]))
+    rng, pairs = stream(0, "explain", "orders", *measured.question.causes), list[tuple[Order, Order]]()
+    known = {*small, everything[-1]}
+    for pair in orders(k, rng):
+        pairs.append(pair)
+        wanted = sorted({mask for order in pair for mask in prefixes(order)})
+        measure(wanted)
+        known.update(wanted)
+        if len(known) == len(everything):
+            return _answer(measured, tuple(_exact(measured)), None, True)
+        found = [_sampled(measured, *of, small, known, pairs) for of in _questions(measured)]
+        reached = all(estimate.is_enough(a.total.summary.mean or 0.0) for a, estimate in found if _is_sure(a))
+        if (reached and len(pairs) >= MIN_PAIRS) or len(pairs) == MOST_PAIRS:
+            break
+    return _answer(measured, tuple(a for a, _ in found), len(pairs), reached)
+
+
+def _is_sure(a: Attribution) -> bool:
+    interval = a.total.summary.ci95
+    return interval is not None and not interval[0] <= 0.0 <= interval[1]
+
+
+def _questions(measured: Measured) -> Iterator[tuple[str, str]]:
+    """Every pipeline and metric that has a value in some run; the oracle's precision is 1 whatever
+    happens."""
+    for pipeline in (*measured.question.pipelines, ORACLE):
+        for metric in METRICS:
+            if pipeline == ORACLE and metric == "precision":
+                continue
+            if np.isfinite(measured.losses(pipeline, metric, measured.masks)).any():
+                yield pipeline, metric
+
+
+def _exact(measured: Measured) -> Iterator[Attribution]:
+    names, seeds = measured.question.causes, measured.question.seeds
+    for pipeline, metric in _questions(measured):
+        losses = measured.losses(pipeline, metric, range(1 << len(names)))
+        yield attribute(losses, names, seeds, pipeline=pipeline, metric=metric)
+
+
+def _sampled(
+    measured: Measured,
+    pipeline: str,
+    metric: str,
+    small: Sequence[int],
+    known: set[int],
+    pairs: Sequence[tuple[Order, Order]],
+) -> tuple[Attribution, Sampled]:
+    names, seeds = measured.question.causes, measured.question.seeds
+    masks = sorted(known)
+    losses = measured.losses(pipeline, metric, masks)
+    has = np.isfinite(losses).all(axis=0)
+    row = {mask: losses[i, has] for i, mask in enumerate(masks)}
+
+    def values(of: Sequence[int]) -> np.ndarray:
+        return np.array([row[mask] for mask in of])
+
+    estimate = sampled(pairs, values)
+    left_out = [seed for seed, ok in zip(seeds, has, strict=True) if not ok]
+    whole = row[(1 << len(names)) - 1]
+    found = attribute_sampled(
+        values(small), whole, estimate, names, seeds, left_out, pipeline=pipeline, metric=metric
+    )
+    return found, estimate
+
+
+def _answer(
+    measured: Measured, attributions: tuple[Attribution, ...], pairs: int | None, reached: bool
+) -> Answer:
+    whole = (1 << len(measured.question.causes)) - 1
+
+    def over_runs(pipeline: str, axis: str, part: str, mask: int) -> Summary:
+        values = measured.raw(pipeline, f"budget_{axis}_m.{part}", mask)
+        return summarize(values, stream(0, "explain", "budget", pipeline, axis, part, str(mask)))
+
+    budget = tuple(
+        BudgetRow(
+            pipeline=pipeline,
+            axis=axis,
+            part=part,
+            clean=over_runs(pipeline, axis, part, 0),
+            whole=over_runs(pipeline, axis, part, whole),
+        )
+        for pipeline in (*measured.question.pipelines, ORACLE)
+        for axis in BUDGET_AXES
+        for part in BUDGET_PARTS
+    )
+    return Answer(attributions=attributions, budget=budget, pairs=pairs, reached=reached)
