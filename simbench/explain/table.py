@@ -39,13 +39,9 @@ def percent(share: float | None) -> str:
 def verdict(found: Attribution) -> str:
     """What the numbers say, in a line."""
     if found.verdict == "caused":
-        others = (
-            f"; also {', '.join(words(e.causes) for e in found.named[1:4])}" if len(found.named) > 1 else ""
-        )
-        more = f" and {len(found.named) - 4} more" if len(found.named) > 4 else ""
-        first = found.named[0]
-        what = "costs" if (first.summary.mean or 0.0) > 0.0 else "gains"
-        return f"{words(first.causes)} {what} most{others}{more}"
+        told = [f"{words(e.causes)} {number(e.summary.mean)}" for e in found.named]
+        also = f"; also {', '.join(told[1:4])}" if len(told) > 1 else ""
+        return f"largest: {told[0]}{also}{f' and {len(told) - 4} more' if len(told) > 4 else ''}"
     return f"{found.verdict}: {found.why}"
 
 
@@ -78,7 +74,7 @@ def as_text(answer: Answer) -> Iterator[str]:
     if answer.pairs is not None:
         enough = "" if answer.reached else "; NOT below 2 % of every total"
         yield f"Shapley values sampled with {answer.pairs} orders and their reverses (± 1 SE){enough}."
-    yield "* beyond chance among all dividends and the total at once. + is worse. [ ]: 95 %, this number alone."
+    yield "* beyond chance among all dividends and the total at once. + is worse. [ ]: 95 %, of it alone."
 
 
 def as_csv(answer: Answer) -> str:

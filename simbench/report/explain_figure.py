@@ -16,6 +16,11 @@ from simbench.report.words import pipeline_words
 LABEL = 34  # letters of a label on one line
 
 
+def width(found: Sequence[Attribution]) -> int:
+    """Of the figure, in its own units."""
+    return 250 + 230 * len(found)
+
+
 def bars(found: Sequence[Attribution]) -> Markup:
     """One metric. Filled: beyond chance among all dividends at once; the line is that interval (of the total
     its own). To the right: costs; to the left: gains."""
@@ -53,7 +58,7 @@ def bars(found: Sequence[Attribution]) -> Markup:
         figure.supxlabel(f"loss of {metric}{unit}: right costs, left gains", fontsize=10)
 
     lines = sum(1 + label.count("\n") for label in labels)
-    return as_svg(250 + 230 * len(found), 70 + 15 * lines, f"What each cause costs of {metric}", draw)
+    return as_svg(width(found), 70 + 15 * lines, f"What each cause costs of {metric}", draw)
 
 
 def _bar(plot: Any, place: int, effect: Effect, of_total: bool) -> None:

@@ -12,7 +12,7 @@ from simbench.explain.causes import Question
 from simbench.explain.table import interval, number, percent, verdict, words
 from simbench.files import write_text
 from simbench.report import palette
-from simbench.report.explain_figure import bars
+from simbench.report.explain_figure import bars, width
 from simbench.report.figures import BUDGET_WORDS
 from simbench.report.stress_page import cost
 from simbench.report.words import pipeline_words
@@ -22,6 +22,7 @@ from simbench.score.statistics import MIN_RUNS
 from simbench.stress.ledger import Outcome
 
 NAME = "explain.html"
+SCALE = 1.35  # pixels of the page to a unit of a figure
 
 
 def write_page(
@@ -49,7 +50,10 @@ def write_page(
         failed=[o for o in outcomes if o.status != "ok"],
         count=len(outcomes),
         on=lambda point: ", ".join(map(str, point)) or "none",
-        metrics=[(metric, defined[metric], found, bars(found)) for metric, found in by_metric.items()],
+        metrics=[
+            (metric, defined[metric], found, bars(found), round(SCALE * width(found)))
+            for metric, found in by_metric.items()
+        ],
         sampled=answer.pairs is not None,
         budget=answer.budget,
         first_part=next(iter(BUDGET_PARTS)),
