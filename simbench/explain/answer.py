@@ -8,7 +8,7 @@ dividends of singles and pairs stay exact, all above is the remainder), and Shap
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,10 @@ from scenarios.seeding import stream
 from simbench.case import ORACLE
 from simbench.explain.attribution import Attribution, attribute, attribute_sampled
 from simbench.explain.dividends import up_to
-from simbench.explain.permutations import MIN_PAIRS, MOST_PAIRS, Order, Sampled, orders, prefixes, sampled
+from simbench.explain.permutations import MIN_PAIRS, MOST_PAIRS, Order, orders, prefixes, sampled
 from simbench.explain.values import METRICS, Measured
 from simbench.score.metrics import BUDGET_AXES, BUDGET_PARTS
-from simbench.score.statistics import Summary, summarize
+from simbench.score.statistics import MIN_RUNS, Summary, summarize, t_interval
 
 MOST_EXACT = 6
 
@@ -70,16 +70,11 @@ def answer(measured: Measured, told: Callable[[Sequence[int]], None] = lambda _:
         known.update(wanted)
         if len(known) == len(everything):
             return _answer(measured, tuple(_exact(measured)), None, True)
-        found = [_sampled(measured, *of, small, known, pairs) for of in _questions(measured)]
-        reached = all(estimate.is_enough(a.total.summary.mean or 0.0) for a, estimate in found if _is_sure(a))
+        reached = all(_is_enough(measured, *of, known, pairs) for of in _questions(measured))
         if (reached and len(pairs) >= MIN_PAIRS) or len(pairs) == MOST_PAIRS:
             break
-    return _answer(measured, tuple(a for a, _ in found), len(pairs), reached)
-
-
-def _is_sure(a: Attribution) -> bool:
-    interval = a.total.summary.ci95
-    return interval is not None and not interval[0] <= 0.0 <= interval[1]
+    found = tuple(_sampled(measured, *of, small, known, pairs) for of in _questions(measured))
+    return _answer(measured, found, len(pairs), reached)
 
 
 def _questions(measured: Measured) -> Iterator[tuple[str, str]]:
@@ -100,30 +95,48 @@ def _exact(measured: Measured) -> Iterator[Attribution]:
         yield attribute(losses, names, seeds, pipeline=pipeline, metric=metric)
 
 
+def _known(
+    measured: Measured, pipeline: str, metric: str, known: Iterable[int]
+) -> tuple[dict[int, np.ndarray], list[int]]:
+    """The losses of every known set, of the runs that have all of them; and the seeds of the other runs."""
+    masks = sorted(known)
+    losses = measured.losses(pipeline, metric, masks)
+    has = np.isfinite(losses).all(axis=0)
+    left_out = [seed for seed, ok in zip(measured.question.seeds, has, strict=True) if not ok]
+    return {mask: losses[i, has] for i, mask in enumerate(masks)}, left_out
+
+
+def _is_enough(
+    measured: Measured, pipeline: str, metric: str, known: Iterable[int], pairs: Sequence[tuple[Order, Order]]
+) -> bool:
+    """Whether the sampling error is below 2 % of this total, or the total may as well be zero."""
+    row, _ = _known(measured, pipeline, metric, known)
+    total = row[max(row)] - row[0]
+    if len(total) < MIN_RUNS:
+        return True
+    low, high = t_interval(total)
+    if low <= 0.0 <= high:
+        return True
+    return sampled(pairs, lambda of: np.array([row[mask] for mask in of])).is_enough(float(total.mean()))
+
+
 def _sampled(
     measured: Measured,
     pipeline: str,
     metric: str,
     small: Sequence[int],
-    known: set[int],
+    known: Iterable[int],
     pairs: Sequence[tuple[Order, Order]],
-) -> tuple[Attribution, Sampled]:
-    names, seeds = measured.question.causes, measured.question.seeds
-    masks = sorted(known)
-    losses = measured.losses(pipeline, metric, masks)
-    has = np.isfinite(losses).all(axis=0)
-    row = {mask: losses[i, has] for i, mask in enumerate(masks)}
+) -> Attribution:
+    row, left_out = _known(measured, pipeline, metric, known)
 
     def values(of: Sequence[int]) -> np.ndarray:
         return np.array([row[mask] for mask in of])
 
-    estimate = sampled(pairs, values)
-    left_out = [seed for seed, ok in zip(seeds, has, strict=True) if not ok]
-    whole = row[(1 << len(names)) - 1]
-    found = attribute_sampled(
-        values(small), whole, estimate, names, seeds, left_out, pipeline=pipeline, metric=metric
-    )
-    return found, estimate
+    return attribute_sampled(
+        values(small), row[max(row)], sampled(pairs, values), measured.question.causes,
+        measured.question.seeds, left_out, pipeline=pipeline, metric=metric,
+    )  # fmt: skip
 
 
 def _answer(
