@@ -37,6 +37,8 @@ def darken(spec: LowLight, delivery: Delivery, site: Site) -> Acted:
     if spec.is_off or not pictured(delivery, names):
         return Acted(delivery=delivery, realised=realised)
     kept = 2.0**-spec.stops
+    if kept <= 0.0:
+        raise ValueError(f"{spec.stops:g} stops leave no light to draw from")
     counted: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
 
     def change(camera: str, seq: int, picture: UInt8[np.ndarray, "h w c"]) -> UInt8[np.ndarray, "h w c"]:

@@ -105,7 +105,7 @@ def _drive(ground: Callable[[], Stage], pictures: bool = False) -> Proving:
         rig = ground().rig
         for spec in specs:
             rig, _ = refit(rig, fault_set((spec,)))
-        once = (_at_once(specs),) if specs else ()
+        once = (specs[-1] if rig is not ground().rig else _at_once(specs),) if specs else ()
         captured = again(replace(ground(), rig=rig), once, seed, pictures)
         return Made(data=(captured, rig), realised=(captured.drawn, rig))
 

@@ -29,7 +29,7 @@ CAMERAS = ("cam-front", "cam-back")
 def test_every_fault_of_the_catalogue_is_proved(fault: str) -> None:
     proof = prove(fault, draws=3)
     assert proof.good, list(failures(proof))
-    assert {tried.kind for tried in proof.tried} >= {"off", "twice"}
+    assert {tried.kind for tried in proof.tried} >= {"off"}
     assert "PROVED" not in "\n".join(lines((proof,)))
 
 
