@@ -17,6 +17,7 @@ from simbench.faults.draw import Drawn, draw
 from simbench.faults.fault import Site, Step
 from simbench.motion import Motion, at
 from simbench.recording import Recording
+from simbench.reuse import Kept, sweeps_key
 from simbench.sensors import gnss, imu, lidar
 from simbench.sensors.boxes import View, true_box
 from simbench.sensors.clock import CameraTiming
@@ -29,6 +30,7 @@ from simbench.truth import GnssReference, ImageTruth, TrueBox, Truth
 from simbench.world import World
 
 FARTHEST_BOX_M = 90.0
+KeptSweeps = Kept[tuple[Sweep, ...]]
 
 
 def set_in_motion(world: World, rig: SensorRig, ego_name: str, drawn: Drawn | None) -> Motion:
@@ -70,18 +72,24 @@ def capture(
     seed: int,
     picture: TakePicture | None = None,
     ideal: bool = False,
+    kept: KeptSweeps | None = None,
 ) -> Captured:
     """Run all sensors over the system's duration. `picture` takes an image (motion, camera, count, true
     mid-exposure) or is None for no images; boxes and scores do not depend on it. `ideal` switches the
-    sensors' own noise off.
+    sensors' own noise off. `kept`: sweeps of the same drive are taken from there, and left there.
     """
     timing = {name: rig.timing(name, system.duration_s, seed) for name in rig.cameras}
     drawn = draw(rig, world, faults, timing, system, seed)
     motion = set_in_motion(world, rig, system.ego, drawn)
     target_id = None if system.target is None else world.find(system.target).object_id
-    end_ns = rig.end_ns(system.duration_s, timing)
+    duration_s = system.duration_s
+    end_ns = rig.end_ns(duration_s, timing)
+
+    def cast() -> tuple[Sweep, ...]:
+        return tuple(_sweeps(rig, motion, duration_s, seed, ideal))
+
     measured = Delivery(
-        sweeps=tuple(_sweeps(rig, motion, system.duration_s, seed, ideal)),
+        sweeps=cast() if kept is None else kept.of(sweeps_key(rig, motion, duration_s, seed, ideal), cast),
         shots={
             name: tuple(_shots(name, rig, motion, system.ego, timing[name], drawn, seed, picture))
             for name in rig.cameras

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 OF_THE_PAPER = ("static_projection", "static_projection_ground", "probabilistic")  # what `demo` runs
 DEFAULT = (*OF_THE_PAPER, "robust")  # what `run` runs
-FAILED, BAD_INPUT, BENCH_ERROR, NOTHING = 1, 2, 3, 5
+BAD_INPUT, NOTHING = 2, 5
 
 
 class _Cli(click.Group):
@@ -283,10 +283,10 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
 
     from simbench import results as result_files
     from simbench.campaign import run_jobs
-    from simbench.canary import canary
     from simbench.environment import environment
     from simbench.files import prepare_folder
     from simbench.formats.kitti import is_recorded
+    from simbench.outcome import exit_code
     from simbench.report.page import write_report
     from simbench.sensors import ray_kernel
     from simbench.sensors.compiled import is_compiled
@@ -314,14 +314,9 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
     else:
         _print_summary(found)
         click.echo(f"report: {page}")
-    blind = canary() if simulated else None
-    if blind:
-        click.echo(f"simbench: {blind}", err=True)
-    statuses = {case.status for result in found for case in result.cases}
-    if blind or statuses & {"bench_error", "receipt_mismatch"}:
-        raise SystemExit(BENCH_ERROR)
-    if statuses - {"ok"}:
-        raise SystemExit(FAILED)
+    code = exit_code(case.status for result in found for case in result.cases)
+    if code:
+        raise SystemExit(code)
 
 
 def _video(found: tuple[JobResult, ...], out: Path, images: Images) -> None:

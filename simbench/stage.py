@@ -18,16 +18,21 @@ from scenarios.scenario import Scenario, System
 from simbench.calibration.file import read_calibration, told
 from simbench.capture import Captured, capture
 from simbench.case import Job, boxes_of
+from simbench.faults.delivery import Sweep
 from simbench.faults.refit import Refit, refit
 from simbench.faults.trace import trace_shake
 from simbench.plugins import reads_images
 from simbench.recording import Recording
+from simbench.reuse import Kept, world_of
 from simbench.sensors.detector import perfect
 from simbench.sensors.pictures import TakePicture, by_gl, by_rays
 from simbench.sensors.render import Renderer
 from simbench.sensors.rig import SensorRig, assemble, resized
 from simbench.switches import check_switches, scored_without, switched
-from simbench.world import World, build_world
+from simbench.world import World
+
+SWEEPS: Kept[tuple[Sweep, ...]] = Kept(1)
+"""Of the drive that was recorded last."""
 
 CATEGORIES: Mapping[str, CategorySize] = {
     name: CategorySize(mean_m=size, spread=SIZE_SPREAD) for name, size in CATEGORY_SIZES.items()
@@ -92,7 +97,7 @@ def set_stage(
         system=system,
         faults=faults,
         rig=rig,
-        world=build_world(scenario, system, seed),
+        world=world_of(scenario, system, seed),
         refits=refits,
     )
 
@@ -103,7 +108,9 @@ def record(job: Job, staged: Stage, picture: TakePicture | None = None) -> Captu
     if boxes_of(job, recorded=False) == "labels":
         declared = rig.rig.model_copy(update={"detector": perfect(rig.rig.detector)})
         rig = replace(rig, rig=declared)
-    captured = capture(staged.system, rig, staged.world, staged.faults, CATEGORIES, job.seed, picture)
+    captured = capture(
+        staged.system, rig, staged.world, staged.faults, CATEGORIES, job.seed, picture, kept=SWEEPS
+    )
     return replace(captured, recording=scored_without(captured.recording, job.off)) if job.off else captured
 
 

@@ -19,12 +19,12 @@ from simbench.explain.runs import question_of_run
 from simbench.explain.table import as_csv, as_text
 from simbench.explain.values import Measured
 from simbench.files import prepare_folder, write_text
+from simbench.outcome import exit_code
 from simbench.plugins import load_pipeline
 from simbench.report.explain_page import sentence, write_page
 from simbench.stage import stage
 from simbench.stress.ledger import Ledger, Outcome
 
-FAILED, BENCH_ERROR = 1, 3
 MOST_CAUSES = 16  # of which all sets of two are run
 
 
@@ -87,14 +87,7 @@ def run_explain(
         fresh=progress.count,
     )  # fmt: skip
     click.echo(f"report: {page}")
-    return _code(measured.outcomes)
-
-
-def _code(outcomes: Sequence[Outcome]) -> int:
-    statuses = {outcome.status for outcome in outcomes}
-    if statuses & {"bench_error", "receipt_mismatch"}:
-        return BENCH_ERROR
-    return FAILED if statuses - {"ok"} else 0
+    return exit_code(outcome.status for outcome in measured.outcomes)
 
 
 class _Progress:

@@ -21,6 +21,7 @@ from simbench.frontier.limits import parse_limits
 from simbench.frontier.question import Question, margins_of, questions
 from simbench.frontier.requirements import Requirement, as_csv, as_yaml
 from simbench.frontier.search import Goal, Margins, search
+from simbench.outcome import exit_code
 from simbench.plugins import load_pipeline
 from simbench.report.frontier_page import write_page
 from simbench.report.stress_page import at
@@ -32,7 +33,6 @@ from simbench.stress.run import measure
 from simbench.stress.table import as_csv as runs_as_csv
 
 OPTION = "--along"
-FAILED, BENCH_ERROR = 1, 3
 
 
 def run_frontier(
@@ -97,9 +97,7 @@ def run_frontier(
         cost=f"{count} recordings, {time.perf_counter() - begun:.0f} s now.",
     )  # fmt: skip
     click.echo(f"report: {page}")
-    if statuses & {"bench_error", "receipt_mismatch"}:
-        return BENCH_ERROR
-    return FAILED if statuses - {"ok"} else 0
+    return exit_code(statuses)
 
 
 def parse_along(arguments: Sequence[str]) -> tuple[Axis, ...]:

@@ -11,11 +11,11 @@ import click
 from scenarios.errors import Where
 from scenarios.faults import FAULTS
 from simbench.campaign import each_of
+from simbench.outcome import FAILED, GOOD
 from simbench.proving.prove import Proof, prove
 from simbench.proving.table import lines
 
 QUICK, FULL = 10, 5000
-FAILED = 1
 
 
 def prove_faults(names: Sequence[str], draws: int, workers: int | None) -> int:
@@ -32,7 +32,7 @@ def prove_faults(names: Sequence[str], draws: int, workers: int | None) -> int:
         click.echo(f"[{len(proofs)}/{len(asked)}] {proof.fault}: {state} ({spent_s:.0f} s)", err=True)
     for line in lines(proofs):
         click.echo(line)
-    return 0 if all(proof.good for proof in proofs) else FAILED
+    return GOOD if all(proof.good for proof in proofs) else FAILED
 
 
 def _prove(task: tuple[str, int]) -> Proof:

@@ -11,9 +11,9 @@ from typing import cast
 
 import click
 
-from simbench.canary import canary
 from simbench.case import Boxes, Job
 from simbench.files import prepare_folder, write_text
+from simbench.outcome import exit_code
 from simbench.plugins import load_pipeline
 from simbench.report.stress_page import at, write_page
 from simbench.stage import stage
@@ -22,8 +22,6 @@ from simbench.stress.ledger import Ledger, Outcome
 from simbench.stress.plan import Design, grid, jobs_of, scattered
 from simbench.stress.run import measure
 from simbench.stress.table import as_csv
-
-FAILED, BENCH_ERROR = 1, 3
 
 
 def run_stress(
@@ -83,10 +81,4 @@ def run_stress(
         command=join(["simbench", *sys.argv[1:]]), wall_s=wall_s, fresh=fresh,
     )  # fmt: skip
     click.echo(f"report: {page}")
-    blind = canary()
-    if blind:
-        click.echo(f"simbench: {blind}", err=True)
-    statuses = {outcome.status for outcome in outcomes}
-    if blind or statuses & {"bench_error", "receipt_mismatch"}:
-        return BENCH_ERROR
-    return FAILED if statuses - {"ok"} else 0
+    return exit_code(outcome.status for outcome in outcomes)

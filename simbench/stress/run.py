@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+from scenarios.faults.motion import SHAKERS
 from simbench.campaign import each_of
 from simbench.case import Job, JobResult
 from simbench.results import reproduce
 from simbench.run import run_job
 from simbench.stress.axes import Point
 from simbench.stress.ledger import Ledger, Outcome
+
+SHAKING = tuple(spec.name for spec in SHAKERS)
 
 
 def outcomes_of(task: tuple[Point, Job]) -> tuple[Outcome, ...]:
@@ -36,6 +39,11 @@ def summarised(point: Point, result: JobResult) -> tuple[Outcome, ...]:
     )
 
 
+def _drive(job: Job) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
+    """What makes the sweeps of a job (`simbench/reuse.py`): jobs that share them come one after the other."""
+    return job.seed, job.changes, tuple(text for text in job.faults if text.startswith(SHAKING))
+
+
 def measure(
     tasks: Sequence[tuple[Point, Job]],
     ledger: Ledger,
@@ -43,7 +51,10 @@ def measure(
     done: Callable[[tuple[Outcome, ...]], None] = lambda _: None,
 ) -> tuple[Outcome, ...]:
     """Run what the ledger does not hold yet; the outcomes of all tasks, in their order."""
-    missing = [task for task in tasks if (task[0], task[1].seed) not in ledger.done]
+    missing = sorted(
+        (task for task in tasks if (task[0], task[1].seed) not in ledger.done),
+        key=lambda task: _drive(task[1]),
+    )
     for outcomes in each_of(outcomes_of, missing, workers):
         ledger.add(outcomes)
         done(outcomes)
