@@ -38,10 +38,12 @@ class BudgetRow:
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """attributions: by pipeline, then metric. pairs: of orders that Shapley values were sampled with; None:
-    exact. reached: whether the sampling error is as small as wanted."""
+    """attributions: by pipeline, then metric. valueless: metrics that no run has, whatever the causes.
+    pairs: of orders that Shapley values were sampled with; None: exact. reached: whether the sampling error
+    is as small as wanted."""
 
     attributions: tuple[Attribution, ...]
+    valueless: tuple[tuple[str, str], ...]
     budget: tuple[BudgetRow, ...]
     pairs: int | None
     reached: bool
@@ -78,13 +80,17 @@ def answer(measured: Measured, told: Callable[[Sequence[int]], None] = lambda _:
 
 
 def _questions(measured: Measured) -> Iterator[tuple[str, str]]:
-    """Every pipeline and metric that has a value in some run; the oracle's precision is 1 whatever
-    happens."""
+    """Those that have a value in some run."""
+    for pipeline, metric in _asked(measured):
+        if np.isfinite(measured.losses(pipeline, metric, measured.masks)).any():
+            yield pipeline, metric
+
+
+def _asked(measured: Measured) -> Iterator[tuple[str, str]]:
+    """Every pipeline and metric; the oracle's precision is 1 whatever happens."""
     for pipeline in (*measured.question.pipelines, ORACLE):
         for metric in METRICS:
-            if pipeline == ORACLE and metric == "precision":
-                continue
-            if np.isfinite(measured.losses(pipeline, metric, measured.masks)).any():
+            if (pipeline, metric) != (ORACLE, "precision"):
                 yield pipeline, metric
 
 
@@ -160,4 +166,6 @@ def _answer(
         for axis in BUDGET_AXES
         for part in BUDGET_PARTS
     )
-    return Answer(attributions=attributions, budget=budget, pairs=pairs, reached=reached)
+    told = {(a.pipeline, a.metric) for a in attributions}
+    valueless = tuple(of for of in _asked(measured) if of not in told)
+    return Answer(attributions=attributions, valueless=valueless, budget=budget, pairs=pairs, reached=reached)

@@ -71,6 +71,8 @@ def as_text(answer: Answer) -> Iterator[str]:
             for e in found.shapley
         )
         yield f"    Shapley: {shares}"
+    for pipeline, metric in answer.valueless:
+        yield f"{pipeline}, {metric}: undecided: no run has a value, whatever the causes"
     if answer.pairs is not None:
         enough = "" if answer.reached else "; NOT below 2 % of every total"
         yield f"Shapley values sampled with {answer.pairs} orders and their reverses (± 1 SE){enough}."

@@ -54,6 +54,7 @@ def write_page(
             (metric, defined[metric], found, bars(found), round(SCALE * width(found)))
             for metric, found in by_metric.items()
         ],
+        valueless=answer.valueless,
         sampled=answer.pairs is not None,
         budget=answer.budget,
         first_part=next(iter(BUDGET_PARTS)),
