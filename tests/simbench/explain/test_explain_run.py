@@ -110,12 +110,17 @@ def test_an_explanation_names_the_cause_and_goes_on_where_it_stopped(short: None
     found = {
         (row["metric"], row["causes"]): (float(row["mean"]), float(row["sd"]))
         for row in rows(whole)
-        if row["kind"] == "dividend" and row["pipeline"] == "static_projection"
+        if row["kind"] == "dividend" and row["pipeline"] == "static_projection" and row["mean"]
     }
     assert found["precision", "calibration.rotation_deg"][0] > 0.05
     for name in ("reference.noise_cm", "calibration.rotation_deg + reference.noise_cm"):
         assert found["precision", name] == (0.0, 0.0)  # exactly: no draw of another moved
-    assert found["mae_m.smooth.gnss", "reference.noise_cm"][0] != 0.0
+    noise = {
+        row["kind"]: row["mean"]
+        for row in rows(whole)
+        if row["metric"] == "budget_lateral_m.reference_noise" and row["pipeline"] == "static_projection"
+    }
+    assert noise["budget clean"] != noise["budget whole"] != ""
     budget = [row for row in rows(whole) if row["kind"] == "budget whole" and row["mean"]]
     parts = [float(r["mean"]) for r in budget if r["metric"].startswith("budget_lateral_m.")]
     assert len(parts) == 2 * 9  # of the pipeline and the oracle
