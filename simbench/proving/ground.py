@@ -113,8 +113,13 @@ def empty(boxes: bool = False) -> Stage:
 
 @lru_cache(maxsize=1)
 def glimpse() -> Stage:
-    """A moment of the drive in which people beside the lanes are pictured."""
-    return _staged(0, GLIMPSE_S, FEW_COLUMNS, SMALL_PX, crowd=True)
+    """A moment of the drive in which people beside the lanes are pictured, by two cameras."""
+    whole = _staged(0, GLIMPSE_S, FEW_COLUMNS, SMALL_PX, crowd=True)
+    two = tuple(whole.rig.cameras)[:2]
+    cameras = {name: whole.rig.cameras[name] for name in two}
+    return replace(
+        whole, rig=replace(whole.rig, cameras=cameras, pinholes={n: whole.rig.pinholes[n] for n in two})
+    )
 
 
 @lru_cache(maxsize=1)

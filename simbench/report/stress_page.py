@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from simbench.case import ORACLE
+from simbench.case import ORACLE, Job
 from simbench.files import write_text
 from simbench.report import palette
 from simbench.report.stress_figures import figure_of
+from simbench.report.stress_worst import overlays
 from simbench.report.words import pipeline_words
 from simbench.score.metrics import METRICS as DEFINED
 from simbench.score.statistics import MIN_RUNS
@@ -29,9 +30,11 @@ PARTS = {
 
 
 def write_page(
-    plan: Plan, outcomes: Sequence[Outcome], out: Path, *, title: str, command: str, wall_s: float, fresh: int
-) -> Path:
-    """Write `out/stress.html` and return its path. wall_s: that `fresh` recordings took now."""
+    plan: Plan, outcomes: Sequence[Outcome], jobs: Mapping[tuple[Point, int], Job], out: Path, *,
+    title: str, command: str, wall_s: float, fresh: int,
+) -> Path:  # fmt: skip
+    """Write `out/stress.html` and return its path. jobs: by point and seed. wall_s: that `fresh` recordings
+    took now."""
     seeds = len({outcome.seed for outcome in outcomes})
     made = Environment(
         loader=PackageLoader("simbench.report", "."), autoescape=True, undefined=StrictUndefined,
@@ -40,6 +43,7 @@ def write_page(
     table = cells(outcomes)
     definition = {metric.name: metric for metric in DEFINED}
     pipelines = [name for name in dict.fromkeys(o.pipeline for o in outcomes) if name != ORACLE]
+    bad = {name: worst(outcomes, name) for name in pipelines}
     page = made.get_template("stress.html.j2").render(
         title=title,
         sentence=_sentence(plan, seeds),
@@ -56,7 +60,8 @@ def write_page(
         ],
         seeds=seeds,
         few=f" (fewer than {MIN_RUNS}: no interval)" if seeds < MIN_RUNS else "",
-        worst=[outcome for name in pipelines for outcome in worst(outcomes, name)],
+        worst=[outcome for found in bad.values() for outcome in found],
+        overlays=overlays(bad, jobs),
         words=pipeline_words,
         at=lambda point: at(plan.axes, point),
         number=lambda value: "–" if value is None else f"{value:.3f}",

@@ -77,8 +77,9 @@ def run_stress(
     wall_s = time.perf_counter() - begun
     write_text(out / "stress.csv", as_csv(plan.axes, outcomes))
     page = write_page(
-        plan, outcomes, out, title=f"{family.name}, {template.system}",
-        command=join(["simbench", *sys.argv[1:]]), wall_s=wall_s, fresh=fresh,
+        plan, outcomes, {(point, job.seed): job for point, job in tasks}, out,
+        title=f"{family.name}, {template.system}", command=join(["simbench", *sys.argv[1:]]),
+        wall_s=wall_s, fresh=fresh,
     )  # fmt: skip
     click.echo(f"report: {page}")
     return exit_code(outcome.status for outcome in outcomes)
