@@ -120,3 +120,15 @@ def test_points_are_combined_over_seeds_and_failures_counted() -> None:
     (cell,) = cells(runs, ("tpr",))
     assert cell.summary.mean == pytest.approx(0.25) and cell.summary.n == 6
     assert (cell.summary.missing, cell.failed) == (1, 1) and cell.summary.ci95 is not None
+
+
+def test_the_worst_runs_are_shown_with_their_pictures(tmp_path: Path) -> None:
+    done = run(
+        "stress", "overtake-approach", "--vary", "timing.trigger_offset_ms=0,100", "--pipeline",
+        "static_projection", "--seeds", "0", "--jobs", "1", "--set", "systems.car.duration_s=0.3", "--out",
+        str(tmp_path),
+    )  # fmt: skip
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "stress.html").read_text(encoding="utf-8")
+    assert page.count("<figure>") == page.count("data:image/jpeg") == 2
+    assert page.index("Worst runs") < page.index("raw box, seed 0") and "points right" in page
