@@ -48,6 +48,7 @@ from scenarios.faults.timing import (
     StampOnSave,
     StampQuantum,
     StampStep,
+    TriggerAngle,
     TriggerOffset,
 )
 
@@ -87,6 +88,7 @@ __all__ = [
     "StampQuantum",
     "StampStep",
     "Trace",
+    "TriggerAngle",
     "TriggerOffset",
     "Undistorted",
     "Vibration",

@@ -32,6 +32,24 @@ class TriggerOffset(FaultSpec):
     sensors: Cameras = "cameras"
 
 
+class TriggerAngle(FaultSpec):
+    """Cameras are fired when the beam points elsewhere than where they look: a wrong spin phase.
+
+    Cameras that the LiDAR triggers expose when the beam is at their angle + angle_deg (counter-clockwise),
+    and their stamps say so. The scan still passes their axis when it did, so that what was synchronised by
+    hardware is angle_deg / 360 of a turn apart. Freely running cameras have no such angle.
+    Unit: degrees of the beam; 10 are 2.8 ms at 10 Hz. Source: judgement.
+    """
+
+    name: ClassVar[str] = "timing.trigger_angle_deg"
+    strength: ClassVar[str] = "angle_deg"
+    zero_when_off: ClassVar[tuple[str, ...]] = ("angle_deg",)
+    unit: ClassVar[str] = "deg"
+
+    angle_deg: Annotated[float, Field(ge=-179, le=179, allow_inf_nan=False)] = 0.0
+    sensors: Cameras = "cameras"
+
+
 class ClockOffset(FaultSpec):
     """A sensor's clock is off: only the stamp moves, by a constant.
 
@@ -270,6 +288,7 @@ class Reordered(FaultSpec):
 
 
 SPECS: tuple[type[FaultSpec], ...] = (
+    TriggerAngle,
     TriggerOffset,
     ClockOffset,
     ClockDrift,
@@ -291,6 +310,7 @@ SEVERITIES: tuple[Severity, ...] = (
         values=(2.0, 10.0, 30.0, 50.0, 100.0),
         source="field reports of 2 to 150 ms",
     ),
+    Severity(fault=TriggerAngle.name, values=(1.0, 3.0, 10.0, 30.0, 90.0), source="judgement"),
     Severity(fault=ClockOffset.name, values=(2.0, 10.0, 30.0, 50.0, 100.0), source="as the trigger offset"),
     Severity(
         fault=ClockDrift.name,

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from scenarios.fault_set import FaultSet
-from scenarios.faults import FaultSpec, MotionBlur, Undistorted
+from scenarios.faults import FaultSpec, MotionBlur, TriggerAngle, Undistorted
 from simbench.capture import Captured
-from simbench.faults import exposure, undistorted
+from simbench.faults import exposure, trigger_angle, undistorted
 from simbench.faults.receipt import Receipt
 from simbench.sensors.rig import SensorRig
 
@@ -40,6 +40,7 @@ class RigFault:
 
 RIG_FAULTS: tuple[RigFault, ...] = (
     RigFault(spec=MotionBlur, change=exposure.expose_longer, receipts=exposure.receipts),
+    RigFault(spec=TriggerAngle, change=trigger_angle.fire_elsewhere, receipts=trigger_angle.receipts),
     RigFault(spec=Undistorted, change=undistorted.bend, receipts=lambda *_: ()),  # the telling's says it all
 )
 """In the order in which they act."""

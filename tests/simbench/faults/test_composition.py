@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scenarios.fault_set import FaultSet, parse_fault_arguments
-from scenarios.faults import FAULTS, CalibrationMixup, FaultSpec, Trace
+from scenarios.faults import FAULTS, CalibrationMixup, FaultSpec, Trace, TriggerAngle
 from scenarios.faults.motion import SHAKERS
 from scenarios.severity import SEVERITIES, severe
 from simbench.faults.receipt import MISMATCH
@@ -53,6 +53,8 @@ def sets(draw: st.DrawFn) -> tuple[FaultSpec, ...]:
 @settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 @given(specs=sets(), system=st.sampled_from(["car", "wearable"]))
 def test_any_six_faults_at_once_are_each_proved(specs: tuple[FaultSpec, ...], system: str) -> None:
+    if system == "wearable":  # its cameras run freely: no beam triggers them
+        specs = tuple(spec for spec in specs if not isinstance(spec, TriggerAngle))
     at = struck(specs, system)
     captured = recorded(at)
     found = receipts_of(captured, at)
