@@ -24,7 +24,7 @@ from simbench.proving.same import same
 
 LEVEL = 4  # at which mutants are tried and honest draws made
 EXACT_Z = 0.02  # an estimator whose errors scatter by less than this share of its SD does not err by chance
-FEW = 10  # draws of a mutant, and of every severity
+FEW = 10  # draws of a mutant or of a severity, where one does not tell
 MOST_Z_SD = 1.25
 CAUGHT, CRASHED, MISSED, SAME = "caught", "crashed", "missed", "same"
 
@@ -77,21 +77,55 @@ class Proof:
         return not self.missed and effective and self.z_holds
 
 
+Drawn = tuple[Receipt, ...]
+"""All receipts of one draw."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trials:
+    """What became of all mutants of a fault; the size of its effect, severity by severity."""
+
+    tried: tuple[Tried, ...]
+    effects: tuple[float | None, ...]
+    rises: bool | None
+
+
 def prove(fault: str, draws: int) -> Proof:
     """Prove one fault by its name with so many honest draws."""
+    return proof_of(fault, trials(fault), honest_draws(fault, range(draws)))
+
+
+def honest_draws(fault: str, seeds: range) -> tuple[Drawn, ...]:
+    """What the receipts say of the fault as it is, seed by seed."""
+    place, levels = place_where(FAULTS[fault]), levels_of(fault)
+    return tuple(_honest(place, levels[min(LEVEL, len(levels)) - 1], seed) for seed in seeds)
+
+
+def trials(fault: str) -> Trials:
+    """All mutants of a fault, and all of its severities."""
     place, cameras = place_where(FAULTS[fault]), tuple(measured().staged.rig.cameras)
     levels = levels_of(fault)
     spec = levels[min(LEVEL, len(levels)) - 1]
-    honest = [_honest(place, spec, seed) for seed in range(draws)]
-    found = [receipt for drawn in honest for receipt in drawn]
-    z = _zs(found)
-    effects = tuple(_effect([_honest(place, level, seed) for seed in range(FEW)]) for level in levels)
-    return Proof(
-        fault=fault,
+    effects = _effects(place, levels, draws=1)
+    if not _rises(effects):  # one draw of a rare thing may be less than another: then on average
+        effects = _effects(place, levels, draws=FEW)
+    return Trials(
         tried=tuple(
             _tried(place, mutant) for asked in _asked(spec, levels) for mutant in mutants(asked, cameras)
         ),
-        draws=draws,
+        effects=effects,
+        rises=None if _words_mean_different_things(spec) else _rises(effects),
+    )
+
+
+def proof_of(fault: str, made: Trials, honest: Sequence[Drawn]) -> Proof:
+    """The proof from its parts."""
+    found = [receipt for drawn in honest for receipt in drawn]
+    z = _zs(found)
+    return Proof(
+        fault=fault,
+        tried=made.tried,
+        draws=len(honest),
         receipts=len(found),
         verified=sum(r.status == OK and r.requested != 0.0 for r in found),
         bad=sum(r.status == MISMATCH for r in found),
@@ -99,8 +133,8 @@ def prove(fault: str, draws: int) -> Proof:
         z_mean=float(z.mean()) if len(z) else None,
         z_sd=float(z.std()) if len(z) else None,
         z_n=len(z),
-        effects=effects,
-        rises=None if _words_mean_different_things(spec) else _rises(effects),
+        effects=made.effects,
+        rises=made.rises,
     )
 
 
@@ -195,6 +229,10 @@ def _zs(found: Iterable[Receipt]) -> np.ndarray:
             by_quantity[r.quantity].append((r.measured - r.realised) / r.estimator_sd)
     errs = [z for z in by_quantity.values() if np.std(z) > EXACT_Z]
     return np.concatenate([np.array(z) for z in errs]) if errs else np.zeros(0)
+
+
+def _effects(place: Proving, levels: Sequence[FaultSpec], draws: int) -> tuple[float | None, ...]:
+    return tuple(_effect([_honest(place, level, seed) for seed in range(draws)]) for level in levels)
 
 
 def _effect(found: Sequence[tuple[Receipt, ...]]) -> float | None:
