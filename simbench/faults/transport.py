@@ -72,13 +72,15 @@ def _latency(spec: Latency, now: Items, rng: np.random.Generator) -> Carried:
 
 def _reordered(spec: Reordered, now: Items, rng: np.random.Generator) -> Carried:
     share = 0.01 * spec.percent
-    held = rng.uniform(size=len(now)) < share / (1.0 - share)  # of those whose predecessor was not held back
-    held[-1:] = False
+    drawn = rng.uniform(size=len(now))
+    held = drawn < share / (1.0 - share)  # of those whose predecessor was not held back
+    held[:1] = drawn[:1] < share
+    held[-1:] = False  # nothing comes behind the last one
     for i in range(1, len(held)):
         held[i] = held[i] and not held[i - 1]
     arrival = [item.arrival_ns for item in now]
     carried = [_arriving(item, arrival[i + 1] + HELD_NS) if held[i] else item for i, item in enumerate(now)]
-    return carried, {"overtaken": 100.0 * float(held.mean())}
+    return carried, {"overtaken": 100.0 * float(held[:-1].mean()) if len(held) > 1 else 0.0}
 
 
 def _entry(

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import pdtrik
 
 from scenarios.errors import BadInput
 from scenarios.faults import FAULTS, FaultSpec, RoadShake, Trace
@@ -25,7 +26,7 @@ from simbench.proving.same import same
 LEVEL = 4  # at which mutants are tried and honest draws made
 EXACT_Z = 0.02  # an estimator whose errors scatter by less than this share of its SD does not err by chance
 FEW = 10  # draws of a mutant or of a severity, where one does not tell
-MOST_Z_SD = 1.25
+MOST_Z_SD, MOST_Z_MEAN = 1.25, 0.2
 CAUGHT, CRASHED, MISSED, SAME = "caught", "crashed", "missed", "same"
 
 
@@ -64,16 +65,28 @@ class Proof:
 
     @property
     def z_holds(self) -> bool:
-        """The mean is within 5 SD of 0, and the SD is that which the receipts publish or less: an estimator
-        may be better than it says, never worse."""
+        """The mean is 0 (within 5 SD of a mean, or a fifth of the SD that is published), and the SD is that
+        which the receipts publish or less: an estimator may be better than it says, never worse."""
         if self.z_mean is None or self.z_sd is None:
             return True
-        return abs(self.z_mean) <= 5.0 * self.z_sd / np.sqrt(self.z_n) and self.z_sd <= MOST_Z_SD
+        apart = max(5.0 * self.z_sd / np.sqrt(self.z_n), MOST_Z_MEAN)
+        return abs(self.z_mean) <= apart and self.z_sd <= MOST_Z_SD
+
+    @property
+    def bad_by_chance(self) -> int:
+        """So many honest receipts may not match: each draw strays beyond its interval once in a million, more
+        of them come once in a thousand proofs."""
+        return int(np.ceil(pdtrik(0.999, 1e-6 * max(self.receipts, 1))))
 
     @property
     def good(self) -> bool:
         """Everything holds."""
-        effective = self.bad == 0 and self.verified > 0 and not self.off_draw and self.rises is not False
+        effective = (
+            self.bad <= self.bad_by_chance
+            and self.verified > 0
+            and not self.off_draw
+            and self.rises is not False
+        )
         return not self.missed and effective and self.z_holds
 
 

@@ -28,7 +28,7 @@ def failures(proof: Proof) -> Iterator[str]:
     """What does not hold of a fault, one sentence each."""
     for name in proof.missed:
         yield f"no receipt sees the mutant '{name}'"
-    if proof.bad:
+    if proof.bad > proof.bad_by_chance:
         yield f"{proof.bad} of {proof.receipts} receipts of honest draws do not match"
     if not proof.verified:
         yield "no receipt verifies the fault: its effect is never seen"
