@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from simbench.commands.check import check
 from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
 
@@ -654,6 +655,7 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
     click.echo(f"wrote {out}")
 
 
+main.add_command(check)
 main.add_command(explain)
 main.add_command(frontier)
 

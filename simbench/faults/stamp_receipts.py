@@ -187,7 +187,7 @@ def jitter(spec: StampJitter, seen: Seen) -> tuple[Receipt, ...]:
 
 
 def saved(spec: StampOnSave, seen: Seen) -> tuple[Receipt, ...]:
-    """How late stamps are against the truth: their mean, and the least of all: of n waits the mean's n-th part."""
+    """How late stamps are against the truth: their mean, and the least: the n-th part of a wait's mean."""
     n, wait = len(seen.before), spec.jitter_ms
     lag_ms = (seen.after.stamp_ns - seen.after.true_ns) * 1e-6 if seen.same else np.array([np.nan])
     note, least_ms = "stamps against true times of exposures and first firings", spec.delay_ms + wait / n
