@@ -129,6 +129,7 @@ class LostInDetail(Wrapped):
 
     def reset(self, calibration: Calibration, categories: Mapping[str, CategorySize]) -> None:
         super().reset(calibration, categories)
+        self.many = False
         self.careful.reset(calibration, categories)
         self.careless.reset(calibration, categories)
 
