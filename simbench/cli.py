@@ -1,5 +1,5 @@
 """The command line: `simbench demo | run | stress | frontier | explain | calibrate | list | describe |
-timeline | doctor | learn`.
+timeline | doctor | learn | check`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
