@@ -545,14 +545,28 @@ def list_(kind: str) -> None:
 
 
 @main.command()
-@click.argument("words", nargs=-1, required=True, metavar="SCENARIO | fault NAME")
+@click.argument("words", nargs=-1, required=True, metavar="SCENARIO | fault NAME | faults")
 @click.option("--seed", type=click.IntRange(0), default=0, help="Which of the scenario's family.")
-def describe(words: tuple[str, ...], seed: int) -> None:
+@click.option(
+    "--picture", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE.svg|png|jpg",
+    help="Of a fault: draw what it does instead, without it and with it.",
+)  # fmt: skip
+@click.option(
+    "--pictures", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER",
+    help="With the word 'faults': draw all of them.",
+)  # fmt: skip
+@click.option("--level", type=click.IntRange(1, 5), default=4, show_default=True, help="Severity to draw.")
+def describe(
+    words: tuple[str, ...], seed: int, picture: Path | None, pictures: Path | None, level: int
+) -> None:
     """Print the concrete scenario of a seed, every number fixed; or a fault: its formula, fields and
-    severities.
+    severities. Or draw what a fault does.
 
     Example: simbench describe overtake-approach --seed 3
     """
+    if picture is not None or pictures is not None:
+        _draw_faults(words, picture, pictures, level)
+        return
     if words[0] == "fault" and len(words) == 2:
         from scenarios.describe_fault import describe_fault
 
@@ -564,6 +578,20 @@ def describe(words: tuple[str, ...], seed: int) -> None:
     from scenarios.load import load_scenario
 
     click.echo(text(load_scenario(words[0]).resolve(seed)), nl=False)
+
+
+def _draw_faults(words: tuple[str, ...], picture: Path | None, pictures: Path | None, level: int) -> None:
+    """One fault into a file, or all of them into a folder."""
+    from simbench.report.fault_pictures.command import write_picture, write_pictures
+
+    if picture is not None and pictures is None and words[0] == "fault" and len(words) == 2:
+        write_picture(words[1], level, picture)
+        click.echo(f"wrote {picture}")
+    elif pictures is not None and picture is None and words == ("faults",):
+        for path in write_pictures(pictures, level):
+            click.echo(f"wrote {path}")
+    else:
+        raise click.UsageError("'fault NAME' goes with --picture FILE, 'faults' with --pictures FOLDER")
 
 
 @main.command()
