@@ -35,6 +35,14 @@ def test_the_fault_document_names_every_fault_and_every_field() -> None:
             assert f"`{field}`" in text, f"{name}: {field}"
 
 
+def test_the_fault_document_shows_a_picture_of_every_fault() -> None:
+    text = (DOCS / "faults.md").read_text(encoding="utf-8")
+    found = re.findall(r'<img src="(faults/([a-z0-9_.]+)\.(?:svg|png|jpg))"', text)
+    shown = {name: file for file, name in found}
+    assert set(shown) == set(FAULTS)
+    assert all((DOCS / file).stat().st_size > 1000 for file in shown.values())
+
+
 def test_the_scenario_document_names_every_scenario_and_every_word_of_a_path_and_a_bend() -> None:
     text = (DOCS / "scenarios.md").read_text(encoding="utf-8")
     assert set(list_scenarios()) == set(re.findall(r"^\| `([a-z-]+)` \|", text, re.MULTILINE))
