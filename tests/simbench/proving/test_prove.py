@@ -1,4 +1,4 @@
-"""Every fault of the catalogue is proved; and a proof fails where something is wrong."""
+"""Faults of the catalogue are proved; and a proof fails where something is wrong."""
 
 from __future__ import annotations
 
@@ -25,8 +25,16 @@ KINDS = {"off", "half", "double", "sign", "sensor", "unit", "twice"}
 CAMERAS = ("cam-front", "cam-back")
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-def test_every_fault_of_the_catalogue_is_proved(fault: str) -> None:
+# Some of every family and every place where faults act. All of them: simbench doctor --faults --quick.
+SOME = (
+    "calibration.rotation_deg", "calibration.undistorted_px", "camera.exposure_ev", "detector.misses_percent",
+    "lidar.ghosts_percent", "motion.knock_deg", "motion.trace", "reference.heading_deg",
+    "timing.clock_offset_ms", "timing.reordered_percent", "timing.trigger_angle_deg",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", SOME)
+def test_a_fault_of_the_catalogue_is_proved(fault: str) -> None:
     proof = prove(fault, draws=3)
     assert proof.good, list(failures(proof))
     assert {tried.kind for tried in proof.tried} >= {"off"}
