@@ -1,6 +1,6 @@
 """The short drives that a pipeline is asked about: a few seconds with the paper's car rig, no images.
 
-The car comes from behind an e-scooter rider and draws level (`overtake-approach`), from 1.5 s before it does.
+The car closes in on an e-scooter rider, from 28 m behind to 18 m (the first 2 s of `overtake-approach`).
 Recordings are kept, since every relation and every pipeline asks for some of the same.
 """
 

@@ -5,7 +5,7 @@ moves every box by dt times its velocity in the picture, in first order the oppo
 scans are the same to the last byte. If the result is moved by what moved the boxes, the mean longitudinal
 shifts s(+dt) and s(-dt) against the run without offset are opposite. A shift to the same side both times is
 no trace of motion: the box took in, or lost, points of something else. That is the claim; a pipeline that
-maps by box edges alone breaks it wherever something else stands or lies beside the object.
+maps by box edges alone may break it wherever something else stands or lies beside the object.
 
 The even part e = (s(+dt) + s(-dt)) / 2 is worked out by seed, over the scans and cameras that all three runs
 have. `does not hold` where the 99 % interval of its mean over seeds keeps farther from 0 than rounding.
