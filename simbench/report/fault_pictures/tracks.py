@@ -14,7 +14,7 @@ from simbench.faults.delivery import Delivery, Shot
 from simbench.report import palette
 from simbench.report.fault_pictures.sketch import Sketch, delivery_of
 
-Rows = Mapping[int, Float64[np.ndarray, "f 4"]]
+Rows = Mapping[int, Float64[np.ndarray, "_ 4"]]
 """By object: time in s, left and right edge in px, id."""
 LAG_S = 1.5
 SWITCH_S = (1.0, 1.5)  # before and after the first switch of ids
@@ -32,11 +32,11 @@ def _lag(one: Delivery, two: Delivery) -> Sketch:
         (camera, thing): (rows, _rows(two, camera)[thing])
         for camera in one.shots
         for thing, rows in _rows(one, camera).items()
-        if thing in _rows(two, camera)
+        if len(_rows(two, camera).get(thing, ())) == len(rows)
     }
     camera, thing = max(found, key=lambda key: _farthest_px(*found[key]))
     was, now = found[camera, thing]
-    worst_s = now[_off_px(was, now).argmax(), 0] if len(now) == len(was) else float(now[-1, 0])
+    worst_s = float(now[_off_px(was, now).argmax(), 0])
     was, now = (rows[np.abs(rows[:, 0] - worst_s) <= 0.5 * LAG_S] for rows in (was, now))
 
     def paint(figure: Any) -> None:
@@ -114,8 +114,8 @@ def _off_px(was: Float64[np.ndarray, "f 4"], now: Float64[np.ndarray, "f 4"]) ->
     return off
 
 
-def _farthest_px(was: Float64[np.ndarray, "f 4"], now: Float64[np.ndarray, "f 4"]) -> float:
-    return float(_off_px(was, now).max()) if len(was) == len(now) else 0.0
+def _farthest_px(was: Float64[np.ndarray, "_ 4"], now: Float64[np.ndarray, "_ 4"]) -> float:
+    return float(_off_px(was, now).max())
 
 
 def _renamed(one: Rows, two: Rows) -> frozenset[int]:
