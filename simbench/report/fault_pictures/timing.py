@@ -51,7 +51,12 @@ def sketch(spec: FaultSpec, before: Any, after: Any) -> Sketch:
         lower.set_xlim(begin_s, begin_s + WINDOW_S)
         lower.set_xlabel(f"true time (s), {CAMERA}")
 
-    return Sketch(before={"messages": one[here]}, after={"messages": two[there]}, paint=paint, height=225.0)
+    return Sketch(
+        before={"messages": one[here], "lost": gone[:0, 0]},
+        after={"messages": two[there], "lost": gone[:, 0]},
+        paint=paint,
+        height=225.0,
+    )
 
 
 def _messages(delivery: Delivery) -> tuple[Int64[np.ndarray, " m"], Float64[np.ndarray, "m 3"]]:
