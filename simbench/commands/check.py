@@ -15,7 +15,7 @@ def check(pipeline: str, quick: bool) -> None:
     PIPELINE is a name, module:attribute or file.py:attribute. Prints a line for each relation: holds, does
     not hold (the worst deviation and where), cannot be said (why). Exit code 0 only if all hold.
 
-    Example: simbench check robust --quick
+    Example: simbench check static_projection --quick
     """
     from simbench.checks.command import check_by_name
     from simbench.checks.relations import QUICK_SEEDS, SEEDS
