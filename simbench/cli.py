@@ -18,12 +18,11 @@ from click.core import ParameterSource
 from simbench.commands.check import check
 from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
+from simbench.commands.options import DEFAULT, OF_THE_PAPER, seeds_of
 
 if TYPE_CHECKING:
     from simbench.case import Boxes, Images, Job, JobResult
 
-OF_THE_PAPER = ("static_projection", "static_projection_ground", "probabilistic")  # what `demo` runs
-DEFAULT = (*OF_THE_PAPER, "robust")  # what `run` runs
 BAD_INPUT, NOTHING = 2, 5
 
 
@@ -65,20 +64,6 @@ def main() -> None:
     """Test bench for LiDAR-camera fusion: inject errors into a simulated drive, score what is recovered."""
 
 
-def _seeds(_: click.Context, __: click.Parameter, text: str) -> tuple[int, ...]:
-    found: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        numbers = (first, last) if dash else (first,)
-        if not all(word.isascii() and word.isdigit() and len(word) < 19 for word in numbers):
-            raise click.BadParameter(f"'{text}' is not a list of seeds; allowed: 0-3 or 0,2,5")
-        low, high = int(first), int(last) if dash else int(first)
-        if high < low or high - low >= 100_000:
-            raise click.BadParameter(f"'{part}' is not a range of seeds from low to high")
-        found += [seed for seed in range(low, high + 1) if seed not in found]
-    return tuple(found)
-
-
 def _span(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
     if text is None:
         return None
@@ -106,7 +91,7 @@ def _size(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int,
 def _common(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """The options that `demo` and `run` share; `folder`: where results go unless told."""
     options = (
-        click.option("--seeds", default="0-1", callback=_seeds, help="Runs to make: 0-3 or 0,2,5."),
+        click.option("--seeds", default="0-1", callback=seeds_of, help="Runs to make: 0-3 or 0,2,5."),
         click.option(
             "--images",
             type=click.Choice(["none", "raycast", "gl"]),
@@ -424,7 +409,7 @@ def _quoted(word: str) -> str:
 @click.option("--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE", help="At all points.")
 @click.option("--set", "changes", multiple=True, metavar="PATH=VALUE", help="At all points.")
 @click.option("--boxes", type=click.Choice(["labels", "model"]), default=None, help="As for run.")
-@click.option("--seeds", default="0-3", callback=_seeds, show_default=True, help="Runs at every point.")
+@click.option("--seeds", default="0-3", callback=seeds_of, show_default=True, help="Runs at every point.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/stress"), show_default=True)
 def stress(
@@ -662,7 +647,7 @@ def doctor(names: tuple[str, ...], faults: bool, quick: bool, draws: int | None,
 
 
 @main.command()
-@click.option("--seeds", default="100000-100003", callback=_seeds, help="From 100000 on.")
+@click.option("--seeds", default="100000-100003", callback=seeds_of, help="From 100000 on.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), required=True, help="The JSON file.")
 def learn(seeds: tuple[int, ...], out: Path) -> None:
     """Learn the shape filter's benchmark shapes from the bench (fusion/shapes.json).

@@ -8,14 +8,11 @@ gain most (`stress/run.py`). Reuse changes no byte: what is kept is found by all
 
 from __future__ import annotations
 
-import hashlib
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import fields, is_dataclass
 from typing import Generic, TypeVar
 
-import numpy as np
-
+from fusion.check import digest
 from scenarios.scenario import Scenario, System
 from simbench.motion import Motion
 from simbench.sensors.rig import SensorRig
@@ -61,27 +58,6 @@ def sweeps_key(rig: SensorRig, motion: Motion, duration_s: float, seed: int, ide
     lidar = rig.lidar_name
     parts = (motion.T_ego_root, motion.T_ego_sensor[lidar], motion.body_shake, motion.flex.get(lidar))
     return (
-        motion.world, motion.ego_actor, motion.pivot_m, lidar, rig.lidar.model_dump_json(), _digest(parts),
+        motion.world, motion.ego_actor, motion.pivot_m, lidar, rig.lidar.model_dump_json(), digest(parts),
         rig.sweeps(duration_s), seed, ideal,
     )  # fmt: skip
-
-
-def _digest(value: object) -> str:
-    """Of data classes, sequences, arrays and plain values, by their bytes."""
-    total = hashlib.sha256()
-
-    def feed(item: object) -> None:
-        total.update(type(item).__name__.encode())
-        if isinstance(item, np.ndarray):
-            total.update(f"{item.dtype}{item.shape}".encode() + np.ascontiguousarray(item).tobytes())
-        elif is_dataclass(item):
-            for field in fields(item):
-                feed(getattr(item, field.name))
-        elif isinstance(item, tuple | list):
-            for part in item:
-                feed(part)
-        else:
-            total.update(repr(item).encode())
-
-    feed(value)
-    return total.hexdigest()

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from simbench.commands.options import DEFAULT, seeds_of
+
 if TYPE_CHECKING:
     from simbench.case import Boxes
 
 
 def _seeds(context: click.Context, option: click.Parameter, text: str | None) -> tuple[int, ...] | None:
-    from simbench.cli import _seeds as parsed
-
-    return None if text is None else parsed(context, option, text)
+    return None if text is None else seeds_of(context, option, text)
 
 
 @click.command()
@@ -56,7 +56,6 @@ def explain(
 
     Example: simbench explain overtake-approach --faults demo --cause timing.trigger_offset_ms --seeds 0-5
     """
-    from simbench.cli import DEFAULT
     from simbench.explain.command import run_explain
 
     code = run_explain(

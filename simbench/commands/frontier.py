@@ -7,15 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from simbench.commands.options import DEFAULT, seeds_of
+
 if TYPE_CHECKING:
     from simbench.case import Boxes
     from simbench.frontier.curve import Functional
-
-
-def _seeds(context: click.Context, parameter: click.Parameter, text: str) -> tuple[int, ...]:
-    from simbench.cli import _seeds as listed
-
-    return listed(context, parameter, text)
 
 
 @click.command()
@@ -44,7 +40,7 @@ def _seeds(context: click.Context, parameter: click.Parameter, text: str) -> tup
 @click.option("--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE", help="At all levels.")
 @click.option("--set", "changes", multiple=True, metavar="PATH=VALUE", help="At all levels.")
 @click.option("--boxes", type=click.Choice(["labels", "model"]), default=None, help="As for run.")
-@click.option("--seeds", default="0-19", callback=_seeds, show_default=True, help="Runs at every level.")
+@click.option("--seeds", default="0-19", callback=seeds_of, show_default=True, help="Runs at every level.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/frontier"), show_default=True)
 def frontier(
@@ -59,7 +55,6 @@ def frontier(
 
     Example: simbench frontier overtake-approach --along motion.flex_deg=0:2 --limit 'precision>=0.9'
     """
-    from simbench.cli import DEFAULT
     from simbench.frontier.command import run_frontier
     from simbench.frontier.search import Goal
 

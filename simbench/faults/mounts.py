@@ -61,7 +61,8 @@ def knock_receipts(
         else:
             note = f"fewer than {FEWEST} frames before or after the knock"
         if item.camera not in cameras:
-            others.append((found or 0.0, SD_DEG + sd))
+            if found is not None:  # what was not measured is not said to be untouched
+                others.append((found, SD_DEG + sd))
             continue
         ramp = drawn.get(item.camera)
         happens = spec.at_s < duration_s
@@ -107,7 +108,7 @@ def drift_receipts(
                 )
             )  # fmt: skip
         if spec.shift_cm or end[3 + shift]:
-            moved_m = item.shift_m - lever_shift_m(item) - _shift_m(item, rest.get(item.camera, ()))
+            moved_m = settled(item, rest.get(item.camera, ()))[1] - lever_shift_m(item)
             found_cm, sd_cm = _fitted(100.0 * moved_m[:, shift], share)
             result.append(
                 judge(
@@ -142,10 +143,6 @@ def _left_rad(
 ) -> Float64[np.ndarray, "f 3"]:
     turn, _ = settled(item, rest)
     return turn if body is None else turn - body.at(item.taken_ns)[:, :3]
-
-
-def _shift_m(item: CameraEvidence, rest: Sequence[BracketMotion]) -> Float64[np.ndarray, "f 3"]:
-    return item.shift_m - settled(item, rest)[1]
 
 
 def _fitted(

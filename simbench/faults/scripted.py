@@ -6,6 +6,8 @@ straight line. A pure tone is one sinusoid.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float64
 
@@ -27,14 +29,9 @@ def mode_shake(spec: Mode, duration_s: float, seed: int) -> Shake:
     """(roll, pitch, yaw in rad, heave in m) of the body."""
     rng = stream(seed, "fault", spec.name)
     if spec.damping == 0.0:
-        frequency = np.array([spec.frequency_hz, spec.frequency_hz * (1.0 + 1e-9)])  # one line, in two halves
-        density = np.ones((4, 2))
-        phase = rng.uniform(0.0, 2.0 * np.pi)
-        raw = Shake(frequency_hz=frequency, amplitude=np.ones((4, 2)), phase_rad=np.full((4, 2), phase))
-        return Shake(
-            frequency_hz=frequency, phase_rad=raw.phase_rad,
-            amplitude=density * (mode_rms(spec) / raw.rms(duration_s))[:, None],
-        )  # fmt: skip
+        phase = np.full((4, 1), rng.uniform(0.0, 2.0 * np.pi))
+        tone = Shake(frequency_hz=np.array([spec.frequency_hz]), amplitude=np.ones((4, 1)), phase_rad=phase)
+        return replace(tone, amplitude=(mode_rms(spec) / tone.rms(duration_s))[:, None])
     frequency = _lines(rng, spec.frequency_hz / REACH, spec.frequency_hz * REACH)
     density = np.tile(mode_density(frequency, (spec.frequency_hz, spec.damping, 1.0)), (4, 1))
     return draw_shake(rng, frequency, density, mode_rms(spec), duration_s)

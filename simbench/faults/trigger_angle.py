@@ -58,9 +58,9 @@ def receipts(
         if before.cameras[name].trigger != "free_run"
     ]  # fmt: skip
     others = [
-        (_turned_deg(name, rate or 0.0, before, captured), SD_DEG)
+        (_turned_deg(name, rate, before, captured), SD_DEG)
         for name in spared(spec, before)
-        if name in before.cameras
+        if name in before.cameras and rate is not None  # else nothing is known of them
     ]
     result += untouched(
         fault=spec.name, quantity="trigger angle of the other cameras", unit="deg", found=others, note=NOTE

@@ -236,3 +236,9 @@ def test_a_bracket_is_found_among_other_motions() -> None:
     assert not [r for r in receipts if r.status == MISMATCH]
     verified = {r.fault for r in receipts if r.status == OK and r.requested}
     assert verified >= {"motion.knock_deg", "calibration.drift_deg", "motion.vibration_deg"}
+
+
+def test_of_cameras_that_could_not_be_measured_nothing_is_said() -> None:
+    """A knock at once: neither that the struck one turned, nor that the others did not."""
+    receipts = found(Knock(angle_deg=1.0, at_s=0.05, sensors=("cam-front",)))  # one frame comes before it
+    assert [(r.quantity, r.status) for r in receipts] == [("cam-front yaw", "unverifiable")]
