@@ -18,6 +18,7 @@ FOLDERS = {
     "rig": "rigs",
     "sensor": "sensors",
     "part": "parts",
+    "suite": "suites",
 }
 NOWHERE = Where(file=None)
 

@@ -31,3 +31,18 @@ def stream(seed: int, *path: str | int) -> np.random.Generator:
     key = digest.digest()
     spawn_key = tuple(int.from_bytes(key[i : i + 4], "little") for i in range(0, len(key), 4))
     return np.random.Generator(np.random.PCG64(np.random.SeedSequence(int(seed), spawn_key=spawn_key)))
+
+
+def seed_list(text: str) -> tuple[int, ...]:
+    """The seeds that a list like 0-3 or 0,2,5 names. ValueError: it is none."""
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        numbers = (first, last) if dash else (first,)
+        if not all(word.isascii() and word.isdigit() and len(word) < 19 for word in numbers):
+            raise ValueError(f"'{text}' is not a list of seeds; allowed: 0-3 or 0,2,5")
+        low, high = int(first), int(last) if dash else int(first)
+        if high < low or high - low >= 100_000:
+            raise ValueError(f"'{part}' is not a range of seeds from low to high")
+        found += [seed for seed in range(low, high + 1) if seed not in found]
+    return tuple(found)

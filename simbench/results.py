@@ -16,26 +16,45 @@ from typing import Any
 
 import numpy as np
 
+from fusion.check import digest
 from scenarios.describe import describe
 from scenarios.scenario import Scenario
 from scenarios.seeding import stream
-from simbench.case import ORACLE, Case, Job, JobResult, Told, boxes_of
+from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
+from simbench.drive import Driven
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
-from simbench.score.metrics import METRICS
 from simbench.score.statistics import summarize
 
 SCHEMA = "simbench-result/1"
+GROUP = ("block", "scenario", "system", "faults", "calibration", "pipeline")  # what runs of a group share
 
 
 def document(results: Sequence[JobResult], environment: Mapping[str, object]) -> dict[str, Any]:
     """The whole of `result.json`. Same inputs, same content, but for `timings` and `environment`."""
+    return assembled([record_of(result) for result in results], environment)
+
+
+def record_of(result: JobResult) -> dict[str, list[dict[str, Any]]]:
+    """What one recording adds to `result.json`: its rows, cases and timings."""
+    return {
+        "rows": [row for case in result.cases for row in _rows(result, case)],
+        "cases": [_case(result, case) for case in result.cases],
+        "timings": [row for case in result.cases for row in _timings(result, case)],
+    }
+
+
+def assembled(
+    records: Sequence[Mapping[str, Sequence[Mapping[str, Any]]]], environment: Mapping[str, object]
+) -> dict[str, Any]:
+    """`result.json` from what its recordings add."""
+    rows = [dict(row) for record in records for row in record["rows"]]
     return {
         "schema": SCHEMA,
-        "rows": [row for result in results for case in result.cases for row in _rows(result, case)],
-        "cases": [_case(result, case) for result in results for case in result.cases],
-        "summary": _summary(results),
-        "timings": [row for result in results for case in result.cases for row in _timings(result, case)],
+        "rows": rows,
+        "cases": [dict(case) for record in records for case in record["cases"]],
+        "summary": _summary(rows),
+        "timings": [dict(row) for record in records for row in record["timings"]],
         "environment": dict(environment),
     }
 
@@ -86,6 +105,11 @@ def scenario_hash(result: JobResult) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
+def outputs_hash(driven: Driven) -> str:
+    """SHA-256 of all that a pipeline gave, whatever time it took."""
+    return digest((driven.outputs, driven.trajectories))
+
+
 def _text(result: JobResult) -> str:
     """What was played, in full; of recorded data what it was and the hash of its files."""
     played = result.scenario
@@ -116,6 +140,7 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
         **_key(result, case),
         "status": case.status,
         "why": case.why,
+        "outputs_sha256": None if case.driven is None else outputs_hash(case.driven),
         "scenario_sha256": scenario_hash(result),
         "fault_specs": result.faults.as_data(),
         "off": list(result.job.off),
@@ -126,35 +151,23 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
     }
 
 
-def _summary(results: Sequence[JobResult]) -> list[dict[str, Any]]:
-    groups: dict[tuple[str, str, str, Told, str], list[tuple[int, Case]]] = {}
-    for result in results:
-        for case in result.cases:
-            job, faults = result.job, result.faults.label
-            key = (result.scenario.name, job.system, faults, job.told, case.pipeline)
-            groups.setdefault(key, []).append((job.seed, case))
+def _summary(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Every metric over the runs of a group: what rows have in common but for their seed."""
+    groups: dict[tuple[str, ...], dict[str, list[Mapping[str, Any]]]] = {}
+    for row in rows:
+        group = groups.setdefault(tuple(row[name] for name in GROUP if name in row), {})
+        group.setdefault(row["metric"], []).append(row)
     content = []
-    for (scenario, system, faults, told, pipeline), members in groups.items():
-        for metric in METRICS:
-            values = {
-                seed: next((r.value for r in case.rows if r.metric == metric.name), None)
-                for seed, case in members
-            }
-            rng = stream(0, "summary", scenario, system, faults, pipeline, metric.name)
-            summary = summarize(values, rng)
+    for group in groups.values():
+        for metric, members in group.items():
+            key = {name: members[0][name] for name in GROUP if name in members[0]}
+            told = ("scenario", "system", "faults", "pipeline")
+            rng = stream(0, "summary", *(key[name] for name in told), metric)
+            summary = summarize({row["seed"]: row["value"] for row in members}, rng)
             content.append(
-                {
-                    "scenario": scenario,
-                    "system": system,
-                    "faults": faults,
-                    "calibration": told,
-                    "pipeline": pipeline,
-                    "metric": metric.name,
-                    "unit": metric.unit,
-                    "better": metric.better,
-                    **dataclasses.asdict(summary),
-                }
-            )
+                {**key, **{name: members[0][name] for name in ("metric", "unit", "better")},
+                 **dataclasses.asdict(summary)}
+            )  # fmt: skip
     return content
 
 

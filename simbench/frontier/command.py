@@ -17,10 +17,10 @@ from scenarios.errors import Where
 from scenarios.seeding import stream
 from simbench.case import ORACLE, Boxes, Job
 from simbench.files import prepare_folder, write_text
-from simbench.frontier.limits import parse_limits
 from simbench.frontier.question import Question, margins_of, questions
 from simbench.frontier.requirements import Requirement, as_csv, as_yaml
 from simbench.frontier.search import Goal, Margins, search
+from simbench.limits import parse_limits
 from simbench.outcome import exit_code
 from simbench.plugins import load_pipeline
 from simbench.report.frontier_page import write_page

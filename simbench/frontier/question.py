@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from simbench.frontier.curve import Functional
-from simbench.frontier.limits import Limit
 from simbench.frontier.search import Margins
+from simbench.limits import Limit
 from simbench.stress.ledger import Outcome
 
 

@@ -14,6 +14,7 @@ STAGE = ".smooth"  # what a stem such as mae_m stands for
 DEFINED = {metric.name: metric for metric in METRICS}
 SIGNED = {metric.name for metric in BUDGET}  # the nearer to 0 the better
 WORST = {"higher": 0.0, "lower": 1.0}  # of a share
+LATENCY = re.compile(r"latency_ms(\.[\w-]+)?\.p(50|99)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +43,7 @@ class Limit:
 
 def parse_limits(arguments: Sequence[str]) -> tuple[Limit, ...]:
     """The limits that `--limit` asks for. BadInput: malformed, unknown metric, wrong way round, twice."""
-    limits = tuple(_parse(argument) for argument in arguments)
+    limits = tuple(parse_limit(argument, Where(file=OPTION)) for argument in arguments)
     names = [limit.metric.name for limit in limits]
     for name in names:
         if names.count(name) > 1:
@@ -50,20 +51,30 @@ def parse_limits(arguments: Sequence[str]) -> tuple[Limit, ...]:
     return limits
 
 
-def _parse(argument: str) -> Limit:
-    where = Where(file=OPTION)
+def metric_named(word: str, where: Where, *, timed: bool = False) -> Metric:
+    """The metric of a name, or of a stem such as mae_m. timed: latencies count too. BadInput: unknown."""
+    name = word if word in DEFINED else word + STAGE
+    if name in DEFINED:
+        return DEFINED[name]
+    if timed and LATENCY.fullmatch(word):
+        return Metric(
+            name=word, unit="ms", better="lower", per="scan", definition="Time that the pipeline takes."
+        )
+    stems = [known.removesuffix(STAGE) for known in DEFINED if known.endswith(STAGE)]
+    latencies = ("latency_ms.p50", "latency_ms.p99") if timed else ()
+    raise where.error(
+        f"unknown metric {show(word)}; 'simbench list metrics' names them",
+        hint=nearest(word, (*DEFINED, *stems, *latencies)),
+    )
+
+
+def parse_limit(argument: str, where: Where, *, timed: bool = False) -> Limit:
+    """One limit. BadInput: malformed, unknown metric, wrong way round."""
     parts = re.fullmatch(r"\s*([^<>=\s]+)\s*(>=|<=)\s*(\S+)\s*", argument)
     if parts is None:
         raise where.error(f"is METRIC>=NUMBER or METRIC<=NUMBER; this is {show(argument)}")
     word, sign, number = parts.groups()
-    name = word if word in DEFINED else word + STAGE
-    if name not in DEFINED:
-        stems = [known.removesuffix(STAGE) for known in DEFINED if known.endswith(STAGE)]
-        raise where.error(
-            f"unknown metric {show(word)}; 'simbench list metrics' names them",
-            hint=nearest(word, (*DEFINED, *stems)),
-        )
-    metric = DEFINED[name]
+    metric = metric_named(word, where, timed=timed)
     if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", number):
         raise where.error(f"{word}: {show(number)} is no number")
     if (sign == ">=") != (metric.better == "higher"):

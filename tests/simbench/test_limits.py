@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import BadInput
 from simbench.frontier.command import parse_along
-from simbench.frontier.limits import parse_limits
+from simbench.limits import parse_limits
 from simbench.frontier.question import margins_of, questions
 from simbench.stress.ledger import Outcome
 
