@@ -62,6 +62,27 @@ class Misses(FaultSpec):
         return self
 
 
+class HardMisses(FaultSpec):
+    """The detector misses what is small in the image or hidden, more than it should.
+
+    Each box of a true object is missed with chance percent / 100 * hardness, on top of the detector's own
+    misses. Hardness is 0 to 1: by size 1 / (1 + (h / half_height_px)^2), h the height of its visible box; by
+    visibility 1 - v, v the visible share of its outline; by either 1 - (1 - by size) (1 - by visibility).
+    Unit: percent of the boxes of which nothing is left to see. Source: judgement (recall falls to half where
+    a detector trained on larger objects has 30 to 50 px).
+    """
+
+    name: ClassVar[str] = "detector.misses_hard_percent"
+    strength: ClassVar[str] = "percent"
+    zero_when_off: ClassVar[tuple[str, ...]] = ("percent",)
+    unit: ClassVar[str] = "% of the hardest boxes"
+
+    percent: Percent = 0.0
+    by: Literal["either", "size", "visibility"] = "either"
+    half_height_px: Annotated[float, Field(gt=0, le=10000, allow_inf_nan=False)] = 40.0
+    sensors: Cameras = "cameras"
+
+
 class FalseBoxes(FaultSpec):
     """The detector sees things that are not there.
 
@@ -171,6 +192,7 @@ class Split(FaultSpec):
 SPECS: tuple[type[FaultSpec], ...] = (
     EdgeError,
     Misses,
+    HardMisses,
     FalseBoxes,
     IdentitySwitches,
     ClassConfusion,
@@ -181,6 +203,7 @@ SPECS: tuple[type[FaultSpec], ...] = (
 SEVERITIES: tuple[Severity, ...] = (
     Severity(fault=EdgeError.name, values=(0.01, 0.02, 0.03, 0.05, 0.1), source="judgement"),
     Severity(fault=Misses.name, values=(2.0, 5.0, 10.0, 20.0, 40.0), source="judgement"),
+    Severity(fault=HardMisses.name, values=(10.0, 20.0, 40.0, 70.0, 100.0), source="judgement"),
     Severity(fault=FalseBoxes.name, values=(0.05, 0.1, 0.3, 1.0, 3.0), source="judgement"),
     Severity(fault=IdentitySwitches.name, values=(0.05, 0.1, 0.3, 1.0, 3.0), source="judgement"),
     Severity(fault=ClassConfusion.name, values=(1.0, 3.0, 10.0, 20.0, 40.0), source="judgement"),

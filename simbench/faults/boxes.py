@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from simbench.faults import (
     box_classes,
+    box_hard_misses,
     box_identity,
     box_lag,
     box_merging,
@@ -18,6 +19,7 @@ from simbench.faults.fault import DeliveryFault
 DELIVERED: tuple[DeliveryFault, ...] = (
     box_classes.FAULT,
     box_misses.FAULT,
+    box_hard_misses.FAULT,
     box_merging.FAULT,
     box_splitting.FAULT,
     false_boxes.FAULT,

@@ -21,7 +21,7 @@ from simbench.faults.delivery import Delivery, Shot
 from simbench.faults.fault import Acted, DeliveryFault, Site, Step
 from simbench.faults.receipt import MISMATCH, Receipt
 from simbench.sensors.detector import draw_track_ids
-from simbench.truth import ImageTruth, ObjectInfo
+from simbench.truth import ImageTruth, ObjectInfo, TrueBox
 from tests.simbench.support import staged
 
 OTHERS = 7
@@ -63,6 +63,8 @@ def _shots(camera: str, place: Site) -> tuple[Shot, ...]:
     traffic = objects[-OTHERS:]
     x, drift = rng.uniform(0.1, 0.9, OTHERS) * width, rng.uniform(-0.002, 0.002, OTHERS) * width
     wide = rng.uniform(0.05, 0.15, OTHERS) * width
+    looks = stream(0, "laws", camera, "looks")
+    tall_px, visible = looks.uniform(5.0, 120.0, OTHERS), looks.uniform(0.1, 1.0, OTHERS)
     result = []
     for f in range(FRAMES):
         boxes = [
@@ -93,7 +95,13 @@ def _shots(camera: str, place: Site) -> tuple[Shot, ...]:
                     **shared,
                     capture_ns=t_ns,
                     T_world_camera=Transform.identity(),
-                    boxes=(),
+                    boxes=tuple(
+                        TrueBox(
+                            object_id=o.object_id, amodal_px=(0.0, 0.0, 10.0, 120.0),
+                            visible_px=(0.0, 0.0, 10.0, float(tall_px[i])), visible_fraction=float(visible[i]),
+                        )
+                        for i, o in enumerate(traffic)
+                    ),
                     detection_object_id=tuple(i for _, i in boxes),
                 ),
             )

@@ -13,15 +13,18 @@ from scenarios.faults.detector import (
     BoxLag,
     ClassConfusion,
     FalseBoxes,
+    HardMisses,
     IdentitySwitches,
     Merged,
     Misses,
     Split,
 )
 from scenarios.severity import severe
+from simbench.faults.box_hard_misses import hardness
 from simbench.faults.deliver import deliver
 from simbench.faults.fault import Acted
 from simbench.faults.receipt import OK, UNVERIFIABLE
+from simbench.truth import TrueBox
 from tests.simbench.faults.laws import (
     Case,
     act,
@@ -41,6 +44,11 @@ CASES = [
     Case(
         Misses(percent=40.0, burst_frames=5.0),
         (*scaled(Misses(percent=40.0, burst_frames=5.0), 0.01, 0.5, 2.0), Misses(percent=40.0)),
+    ),
+    Case(HardMisses(percent=60.0), scaled(HardMisses(percent=60.0), 0.01, 0.5, 1.6)),
+    Case(
+        HardMisses(percent=60.0, by="size"),
+        (HardMisses(percent=60.0, by="visibility"), HardMisses(percent=60.0, half_height_px=200.0)),
     ),
     Case(FalseBoxes(boxes_per_image=1.0), scaled(FalseBoxes(boxes_per_image=1.0), 0.01, 0.5, 2.0)),
     Case(IdentitySwitches(per_s=4.0), scaled(IdentitySwitches(per_s=4.0), 1e-3, 0.5, 2.0)),
@@ -151,6 +159,37 @@ def test_all_together_keep_their_receipts_and_their_draws() -> None:
             assert len(set(tracks)) == len(tracks)
 
 
+@pytest.mark.parametrize(
+    ("by", "height_px", "visible", "hard"),
+    [
+        ("size", 40.0, 0.5, 0.5),  # as high as half_height_px
+        ("size", 20.0, 1.0, 0.8),  # half as high: 1 / (1 + 1/4)
+        ("size", 120.0, 1.0, 0.1),  # three times as high: 1 / (1 + 9)
+        ("visibility", 20.0, 1.0, 0.0),  # nothing of it hidden
+        ("visibility", 500.0, 0.25, 0.75),
+        ("either", 40.0, 0.4, 0.8),  # found with 0.5 * 0.4
+    ],
+)
+def test_how_hard_a_box_is_to_see_by_hand(by: str, height_px: float, visible: float, hard: float) -> None:
+    box = TrueBox(
+        object_id=0, amodal_px=(0.0, 0.0, 9.0, 9.0), visible_px=(5.0, 7.0, 9.0, 7.0 + height_px),
+        visible_fraction=visible,
+    )  # fmt: skip
+    assert hardness(HardMisses(by=by, half_height_px=40.0), box) == pytest.approx(hard)
+
+
+def test_as_many_misses_that_come_evenly_are_not_those_of_what_is_hard_to_see() -> None:
+    spec, before = HardMisses(percent=70.0), clean()
+    honest = act(spec, before, site())
+    boxes = [
+        sum(len(shot.detections.boxes) for shots in delivery.shots.values() for shot in shots)
+        for delivery in (before, honest.delivery)
+    ]
+    even = act(Misses(percent=100.0 * (1.0 - boxes[1] / boxes[0])), before, site()).delivery
+    found = mismatches(receipts(spec, before, replace(honest, delivery=even), site()))
+    assert {"missed of the harder ones", "missed of the easier ones"} <= set(found)
+
+
 def test_without_boxes_nothing_is_claimed() -> None:
     before = clean()
     empty = replace(
@@ -190,6 +229,8 @@ def test_a_merged_box_is_the_larger_objects_and_a_split_box_stays_its_own() -> N
         (Misses, {"percent": -1.0}, "greater than or equal to 0"),
         (Misses, {"percent": 10.0, "burst_frames": 0.5}, "at least 1"),
         (Misses, {"percent": 90.0, "burst_frames": 2.0}, "too short for bursts"),
+        (HardMisses, {"half_height_px": 0.0}, "greater than 0"),
+        (HardMisses, {"by": "colour"}, "'either', 'size' or 'visibility'"),
         (FalseBoxes, {"boxes_per_image": float("inf")}, "finite"),
         (IdentitySwitches, {"per_s": 6.0}, "less than or equal to 5"),
         (IdentitySwitches, {"per_s": 1.0, "mode": "swop"}, "'swap' or 'fresh'"),
