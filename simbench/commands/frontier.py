@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 @click.option("--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE", help="At all levels.")
 @click.option("--set", "changes", multiple=True, metavar="PATH=VALUE", help="At all levels.")
 @click.option("--boxes", type=click.Choice(["labels", "model"]), default=None, help="As for run.")
-@click.option("--seeds", default="0-19", callback=seeds_of, show_default=True, help="Runs at every level.")
+@click.option("--seeds", default="0-39", callback=seeds_of, show_default=True, help="Runs at every level.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/frontier"), show_default=True)
 def frontier(

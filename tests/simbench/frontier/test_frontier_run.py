@@ -131,9 +131,19 @@ def test_few_runs_illustrate_and_every_axis_is_a_requirement_of_its_own(tmp_path
 
 def test_twenty_runs_without_a_failure_say_what_they_show(tmp_path: Path) -> None:
     with bench():
-        done = run(tmp_path, "--along", "motion.flex_deg=0:2", *LIMITS[:2])
+        done = run(tmp_path, "--along", "motion.flex_deg=0:2", *LIMITS[:2], "--seeds", "0-19")
     assert "20 runs without a failure show a share of 0.86; 0.9 takes 29" in done.output
     assert "not shown safe anywhere (not broken up to 2 deg RMS)" in done.output
+
+
+def test_by_default_there_are_as_many_runs_as_a_share_of_nine_in_ten_takes(tmp_path: Path) -> None:
+    with bench():
+        done = run(tmp_path, "--along", "motion.flex_deg=0:2", *LIMITS[:2])
+    (entry,) = entries(tmp_path)
+    assert entry["runs"] == 40 >= 29 and entry["safe_to"] == 2.0, done.output
+    assert "without a failure show a share" not in done.output
+    document = (Path(__file__).parents[3] / "docs" / "frontier.md").read_text(encoding="utf-8")
+    assert "| `--seeds 0-39` (default) |" in document
 
 
 def test_a_logistic_curve_is_of_shares(tmp_path: Path) -> None:
