@@ -49,7 +49,7 @@ class CalibrationTranslation(FaultSpec):
 
 
 class Drift(FaultSpec):
-    """A camera's mount creeps away from where it was calibrated, evenly over the run.
+    """The mount of a camera, or the LiDAR's, creeps away from where it was calibrated, evenly over the run.
 
     At time t of a run of length T the bracket is turned by angle_deg t / T about an axis of the ego, and
     shifted by shift_cm t / T along one. The fusion is told the pose at time 0 for good.
@@ -66,7 +66,7 @@ class Drift(FaultSpec):
     axis: Literal["roll", "pitch", "yaw"] = "yaw"
     shift_cm: Annotated[float, Field(ge=-100, le=100, allow_inf_nan=False)] = 0.0
     along: Literal["x", "y", "z"] = "y"
-    sensors: Cameras = "cameras"
+    sensors: Sensors = "cameras"
 
 
 class FocalLength(FaultSpec):

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
-from scenarios.faults.spec import Cameras, FaultSpec, Severity
+from scenarios.faults.spec import FaultSpec, Sensors, Severity
 from scenarios.scenario import Finite, Spec, broken
 
 
@@ -74,10 +74,11 @@ class RoadShake(FaultSpec):
 
 
 class Flex(FaultSpec):
-    """Each camera's bracket bends against the body, independently of the others.
+    """The bracket of each camera, or the LiDAR's, bends against the body, independently of the others.
 
     Rotation about each of the three axes is band noise of RMS rms_deg; the first mode lies at 20-60 Hz
-    (stiff) or 8-20 Hz (soft). The calibration still tells the pose at rest.
+    (stiff) or 8-20 Hz (soft). The calibration still tells the pose at rest; every beam of a LiDAR that bends
+    is cast from where it is as it fires.
     Unit: degrees RMS per axis. Source: judgement.
     """
 
@@ -88,7 +89,7 @@ class Flex(FaultSpec):
 
     rms_deg: Annotated[float, Field(ge=0, le=30, allow_inf_nan=False)] = 0.0
     stiffness: Literal["stiff", "soft"] = "stiff"
-    sensors: Cameras = "cameras"
+    sensors: Sensors = "cameras"
 
 
 Axis = Literal["roll", "pitch", "yaw"]
@@ -185,7 +186,7 @@ class Trace(FaultSpec):
 
 
 class Knock(FaultSpec):
-    """Something knocks a camera's bracket: from then on it looks elsewhere than it was calibrated.
+    """Something knocks a sensor's bracket: from then on it looks elsewhere than it was calibrated.
 
     The bracket turns by angle_deg about an axis of the ego at at_s, within rise_ms (a half cosine).
     Unit: degrees. Source: judgement (1-2 degrees).
@@ -200,7 +201,7 @@ class Knock(FaultSpec):
     axis: Axis = "yaw"
     at_s: Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)] = 1.0
     rise_ms: Annotated[float, Field(ge=1, le=1000, allow_inf_nan=False)] = 10.0
-    sensors: Cameras = "cameras"
+    sensors: Sensors = "cameras"
 
 
 SHAKERS: tuple[type[FaultSpec], ...] = (Mode, RoadShake, Spectrum, Trace, Vibration)

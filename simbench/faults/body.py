@@ -14,7 +14,7 @@ from scenarios.faults import FaultSpec, Mode, RoadShake, Spectrum, Trace, Vibrat
 from scenarios.severity import Profile
 from simbench.dynamics.ride import Ride
 from simbench.faults import motion, road, scripted, trace
-from simbench.faults.estimate import BodyAttitude, CameraEvidence
+from simbench.faults.estimate import BodyAttitude, PoseEvidence
 from simbench.faults.receipt import Receipt
 from simbench.path import Track
 from simbench.shake import BodyShake, Shake
@@ -43,7 +43,7 @@ class BodyFault:
     spec: type[FaultSpec]
     shake: Callable[[Any, Carriage], BodyShake | None]
     receipts: Callable[
-        [Any, BodyShake | None, float, BodyAttitude | None, Sequence[CameraEvidence]], tuple[Receipt, ...]
+        [Any, BodyShake | None, float, BodyAttitude | None, Sequence[PoseEvidence]], tuple[Receipt, ...]
     ]
 
 
@@ -56,14 +56,14 @@ def _road(spec: RoadShake, carriage: Carriage) -> Ride | None:
 
 def _road_receipts(
     spec: RoadShake, drawn: BodyShake | None, duration_s: float, body: BodyAttitude | None,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
 ) -> tuple[Receipt, ...]:  # fmt: skip
     return road.road_receipts(spec, drawn if isinstance(drawn, Ride) else None, duration_s, body, evidence)
 
 
 def _trace_receipts(
     spec: Trace, drawn: BodyShake | None, duration_s: float, body: BodyAttitude | None,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
 ) -> tuple[Receipt, ...]:  # fmt: skip
     asked = trace.trace_rms(spec, duration_s)
     return motion.shake_receipts(spec.name, asked, drawn, duration_s, body, evidence, allowed=TRACE_ALLOWED)

@@ -1,8 +1,9 @@
 """detector.misses_hard_percent: the smaller or more hidden an object, the likelier it is not found.
 
-Per object, camera and frame one free draw u, in view or not: missed where u < percent / 100 * hardness of the
-true box in that image. Receipt: boxes that are gone over the sum of the hardness of all that were there, which
-is `percent` on average, over all boxes and on either side of hardness 1/2: misses that come evenly are not it.
+Per object, camera and frame one free draw u, in view or not: missed where u < percent / 100 * hardness of
+the true box in that image. Receipt: boxes that are gone over the sum of the hardness of all that were there,
+which is `percent` on average, over all boxes and on either side of hardness 1/2: misses that come evenly are
+not it.
 """
 
 from __future__ import annotations

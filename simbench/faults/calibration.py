@@ -19,7 +19,7 @@ from fusion.messages import Calibration
 from scenarios.faults import CalibrationRotation
 from scenarios.seeding import stream
 from simbench.axes import R_BODY_OPTICAL
-from simbench.faults.estimate import CameraEvidence, bracket_turn_rad, detrended
+from simbench.faults.estimate import PoseEvidence, bracket_turn_rad, detrended
 from simbench.faults.known import told_pose
 from simbench.faults.receipt import Receipt, judge, untouched
 from simbench.faults.struck import spared, struck
@@ -66,7 +66,7 @@ def receipts(spec: CalibrationRotation, step: Telling, witness: Witness) -> tupl
     """Per struck sensor: the turn of what the fusion is told, about the drawn axis and signed. Where the
     fault names sensors: that the others are told what was told before.
     """
-    seen = {item.camera: item for item in witness.evidence}
+    seen = {item.sensor: item for item in witness.evidence}
     result: list[Receipt] = []
     others: list[tuple[float, float]] = []
     for sensor in (*witness.place.cameras, witness.place.lidar_name):
@@ -107,7 +107,7 @@ def _excess_deg(
     sensor: str,
     drawn_deg: Float64[np.ndarray, "3"],
     step: Telling,
-    seen: Mapping[str, CameraEvidence],
+    seen: Mapping[str, PoseEvidence],
     witness: Witness,
 ) -> tuple[Float64[np.ndarray, "3"], float]:
     """What the told attitude is turned by beyond the drawn turn, a rotation vector in the axes of the view,
@@ -124,7 +124,7 @@ def _excess_deg(
     return excess_deg, sd_deg
 
 
-def _mean_attitude(item: CameraEvidence, witness: Witness) -> tuple[Float64[np.ndarray, "3 3"], float]:
+def _mean_attitude(item: PoseEvidence, witness: Witness) -> tuple[Float64[np.ndarray, "3 3"], float]:
     """How a camera was turned against its rest over the run on average (in ego axes), and its SD in degrees.
 
     Flex averages out over the frames. The shake's own mean over the run stays, which no gyro sees: 0.5 s over

@@ -1,8 +1,9 @@
-"""Independent estimates of what the cameras and the body really did, from what the sensors put out.
+"""Independent estimates of what the sensors and the body really did, from what the sensors put out.
 
 Each camera sees known points (see `sensors/fiducials.py`); OpenCV's PnP gives its pose, which is compared
-with the pose that script and rest calibration predict. The gyro gives the body's attitude. None of this
-shares code with an injector; a drawn signal enters only as what a measurement is correlated with (`gain`).
+with the pose that script and rest calibration predict. Of the LiDAR see `lidar_pose.py`. The gyro gives the
+body's attitude. None of this shares code with an injector; a drawn signal enters only as what a measurement
+is correlated with (`gain`).
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from fusion.geometry import skew
 from fusion.messages import EgoMotion
 
 SLOWEST_MPS = 0.5
+PNP, PLATES = "PnP", "plates"
 ROUNDS = 6  # of integrating the gyro: a swing of 1 rad leaves 1/720
 LEAST_TURN_RAD = 1e-3  # of the heading: less turns no tilt into anything
 
@@ -28,24 +30,29 @@ class SlowEgo(Exception):  # noqa: N818 (a reason for a receipt, not a failure)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CameraEvidence:
-    """One camera over the run: its pose by PnP, against the one that the script predicts for a camera at rest
-    on its mount.
+class PoseEvidence:
+    """One sensor over the run: its pose as known points show it, against the one that the script predicts for
+    it at rest on its mount.
 
-    taken_ns: when the pictures were really taken. turn_rad [f 3]: attitude against the predicted one at that
-    instant, as a rotation vector in ego axes. shift_m [f 3]: position against the predicted one at the
-    *claimed* mid-exposure, in ego axes. R_ego_camera, position_ego_m: the rest pose. pivot_ego_m: about what
-    the body shakes. speed_mps [f]: of the ego by script.
+    by: what found it, in words. taken_ns: when a picture was really taken, a beam was fired. turn_rad [f 3]:
+    attitude against the predicted one at that instant, as a rotation vector in ego axes. shift_m [f 3]:
+    position against the predicted one at the *claimed* mid-exposure, in ego axes. position_ego_m: at rest.
+    pivot_ego_m: about what the body shakes. speed_mps [f]: of the ego by script.
     """
 
-    camera: str
+    sensor: str
+    by: str
     taken_ns: Int64[np.ndarray, " f"]
     turn_rad: Float64[np.ndarray, "f 3"]
     shift_m: Float64[np.ndarray, "f 3"]
-    R_ego_camera: Float64[np.ndarray, "3 3"]
     position_ego_m: Float64[np.ndarray, "3"]
     pivot_ego_m: Float64[np.ndarray, "3"]
     speed_mps: Float64[np.ndarray, " f"]
+
+    @property
+    def kind(self) -> str:
+        """Camera or LiDAR."""
+        return "camera" if self.by == PNP else "LiDAR"
 
     @property
     def frames(self) -> int:
@@ -87,6 +94,12 @@ class BodyAttitude:
         unseen = unseen[:, [True, True, *(np.ptp(unseen[:, 2:], axis=0) > LEAST_TURN_RAD)]]
         rest: np.ndarray = value - unseen @ np.linalg.lstsq(unseen, value, rcond=None)[0]
         return rest
+
+
+def others_of(evidence: Sequence[PoseEvidence], struck: Sequence[str]) -> tuple[str, str]:
+    """What the sensors are called that a fault must leave alone, and what measured them."""
+    by = sorted({item.by for item in evidence if item.sensor not in struck})
+    return "cameras" if by == [PNP] else "sensors", " and ".join(by)
 
 
 def camera_pose(
@@ -155,8 +168,8 @@ def gyro_attitude(
     return BodyAttitude(stamp_ns=stamp, angle_rad=angle, yaw_rad=yaw, sd_rad=float(0.26 * walk))
 
 
-def lever_shift_m(item: CameraEvidence) -> Float64[np.ndarray, "f 3"]:
-    """How the body's turn about its pivot moves the camera, to second order of the turn."""
+def lever_shift_m(item: PoseEvidence) -> Float64[np.ndarray, "f 3"]:
+    """How the body's turn about its pivot moves the sensor, to second order of the turn."""
     arm = item.position_ego_m - item.pivot_ego_m
     moved = []
     for turn in item.turn_rad:
@@ -165,8 +178,8 @@ def lever_shift_m(item: CameraEvidence) -> Float64[np.ndarray, "f 3"]:
     return np.array(moved)
 
 
-def bracket_turn_rad(item: CameraEvidence, body: BodyAttitude) -> Float64[np.ndarray, "f 3"]:
-    """Attitude of the camera against the body. The shake's own mean and trend over the run, which no gyro
+def bracket_turn_rad(item: PoseEvidence, body: BodyAttitude) -> Float64[np.ndarray, "f 3"]:
+    """Attitude of the sensor against the body. The shake's own mean and trend over the run, which no gyro
     sees, are still in it.
     """
     turn: np.ndarray = item.turn_rad - body.at(item.taken_ns)
@@ -174,7 +187,7 @@ def bracket_turn_rad(item: CameraEvidence, body: BodyAttitude) -> Float64[np.nda
 
 
 def capture_delay_ms(
-    item: CameraEvidence, body: BodyAttitude | None
+    item: PoseEvidence, body: BodyAttitude | None
 ) -> tuple[Float64[np.ndarray, " f"], float]:
     """Delay of each frame from the shift along the path, and the SD of one estimate: the bracket's own
     bending is taken for a turn of the body, which has a lever arm. Raises SlowEgo.

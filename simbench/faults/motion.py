@@ -1,9 +1,10 @@
-"""motion.vibration_deg and motion.flex_deg: scripted shake of the body, and of each camera's bracket.
+"""motion.vibration_deg and motion.flex_deg: scripted shake of the body, and of each sensor's bracket.
 
 Vibration: roll, pitch, yaw and heave of the ego's body, each a sum of sinusoids whose density is resonances
 (a second-order mode's |H|^2) over band noise falling with 1/f^2; rescaled so that this run's RMS about its
 straight-line fit is the request. Flex: roll, pitch, yaw of one bracket, one mode drawn per bracket and axis.
-Receipts: gyro (and camera heights) for the body; PnP attitude less the gyro's for the brackets.
+Receipts: gyro (and camera heights) for the body; attitude (a camera's by PnP, the LiDAR's by
+plates) less the gyro's for the brackets.
 """
 
 from __future__ import annotations
@@ -18,17 +19,18 @@ from scenarios.seeding import stream
 from scenarios.severity import Profile, road_class
 from simbench.faults.estimate import (
     BodyAttitude,
-    CameraEvidence,
+    PoseEvidence,
     bracket_turn_rad,
     detrended,
     gain,
     lever_shift_m,
+    others_of,
 )
 from simbench.faults.receipt import Receipt, judge, untouched
 from simbench.shake import BodyShake, Shake, draw_shake
 
 VIBRATION, FLEX = "motion.vibration_deg", "motion.flex_deg"
-NOTE = "camera attitude by PnP less the body's by gyro"
+NOTE = "{} attitude by {} less the body's by gyro"
 TO_DEG_AND_M = np.array([np.rad2deg(1.0)] * 3 + [1.0])
 AXES = (  # of a body shake: name, unit, what measures it
     ("roll", "deg", "integrated gyro"),
@@ -109,10 +111,10 @@ def requested_rms(spec: Vibration) -> Float64[np.ndarray, "4"]:
     return np.array([pitch * spec.roll_ratio, pitch, pitch * spec.yaw_ratio, heave])
 
 
-def bracket_shake(spec: Flex, camera: str, duration_s: float, seed: int) -> Shake:
-    """(roll, pitch, yaw in rad) of one camera's bracket."""
+def bracket_shake(spec: Flex, sensor: str, duration_s: float, seed: int) -> Shake:
+    """(roll, pitch, yaw in rad) of one sensor's bracket."""
     low, high = {"stiff": (20.0, 60.0), "soft": (8.0, 20.0)}[spec.stiffness]
-    rng = stream(seed, "fault", FLEX, camera)
+    rng = stream(seed, "fault", FLEX, sensor)
     edges = np.geomspace(0.5 * low, 2.0 * high, LINES + 1)
     frequency = edges[:-1] + np.diff(edges) * rng.uniform(0.0, 1.0, LINES)
     density = np.stack([mode_density(frequency, (rng.uniform(low, high), 0.05, 1.0)) for _ in range(3)])
@@ -125,7 +127,7 @@ def shake_receipts(
     realised: BodyShake | None,
     duration_s: float,
     body: BodyAttitude | None,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
     *,
     allowed: float = 0.01,
 ) -> tuple[Receipt, ...]:
@@ -162,7 +164,7 @@ def found_rms(
     realised: BodyShake | None,
     duration_s: float,
     body: BodyAttitude | None,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
 ) -> list[tuple[float | None, float]]:
     """(found, SD of the estimate) of roll, pitch, yaw in degrees and heave in metres; found is None without
     the sensors for it.
@@ -206,12 +208,12 @@ def _contained(found: np.ndarray, drawn: np.ndarray, rms: float, scale: float) -
 
 
 def _seen(
-    turn_rad: Float64[np.ndarray, "f 3"], item: CameraEvidence, body: BodyAttitude | None
+    turn_rad: Float64[np.ndarray, "f 3"], item: PoseEvidence, body: BodyAttitude | None
 ) -> Float64[np.ndarray, "f 3"]:
     return detrended(turn_rad) if body is None else body.seen(turn_rad, item.taken_ns)
 
 
-def _heave_sd_m(evidence: Sequence[CameraEvidence], body: BodyAttitude | None) -> float:
+def _heave_sd_m(evidence: Sequence[PoseEvidence], body: BodyAttitude | None) -> float:
     """A bracket that bends is taken for a turn of the body: its bending times the lever arm, over all
     frames.
     """
@@ -229,10 +231,10 @@ def flex_receipts(
     cameras: Sequence[str],
     realised: Mapping[str, Shake],
     duration_s: float,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
     body: BodyAttitude | None,
 ) -> tuple[Receipt, ...]:
-    """Per struck camera: how often the drawn bending is contained in its attitude (PnP) against the body's
+    """Per struck sensor: how often the drawn bending is contained in its attitude against the body's
     (gyro), times its RMS over all axes. Where the fault names cameras: that the others do not bend.
     """
     result: list[Receipt] = []
@@ -243,16 +245,16 @@ def flex_receipts(
         # commute.
         left = 0.02 * float(bending.std()) if body is None else body.rms_rad * (0.005 + 0.5 * body.rms_rad)
         left_deg = float(np.rad2deg(left + (0.0 if body is None else body.sd_rad)))
-        if item.camera not in cameras:
+        if item.sensor not in cameras:
             others.append((float(np.rad2deg(np.std(bending))), 0.002 + left_deg))
             continue
-        shake = realised.get(item.camera)
+        shake = realised.get(item.sensor)
         rms = 0.0 if shake is None else float(np.rad2deg(np.sqrt(np.mean(shake.rms(duration_s) ** 2))))
         drawn = np.zeros_like(bending) if shake is None else _seen(shake.at(item.taken_ns), item, body)
         result.append(
             judge(
                 fault=FLEX,
-                quantity=f"{item.camera} bracket RMS",
+                quantity=f"{item.sensor} bracket RMS",
                 unit="deg",
                 requested=spec.rms_deg,
                 realised=rms,
@@ -260,10 +262,12 @@ def flex_receipts(
                 # Large turns about three axes do not commute.
                 estimator_sd=0.001 + left_deg / np.sqrt(item.frames) + 0.1 * float(np.deg2rad(rms)) * rms,
                 allowed=0.01 * spec.rms_deg,
-                note=NOTE,
+                note=NOTE.format(item.kind, item.by),
             )
         )
+    called, by = others_of(evidence, cameras)
     result += untouched(
-        fault=FLEX, quantity="bending of the other cameras", unit="deg", found=others, note=NOTE
-    )
+        fault=FLEX, quantity=f"bending of the other {called}", unit="deg", found=others,
+        note=NOTE.format(called.removesuffix("s"), by),
+    )  # fmt: skip
     return tuple(result)

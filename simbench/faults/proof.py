@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from fusion.camera import project_points
-from fusion.geometry import rotation_log
 from scenarios.fault_set import FaultSet
 from scenarios.faults import Drift, EdgeError, FaultSpec, Flex, Knock, TriggerOffset
 from simbench.capture import Captured
@@ -18,7 +14,8 @@ from simbench.faults import timing as timing_fault
 from simbench.faults.body import shaking
 from simbench.faults.deliver import DELIVERY_FAULTS
 from simbench.faults.draw import Drawn, place_of
-from simbench.faults.estimate import BodyAttitude, CameraEvidence, camera_pose, gyro_attitude
+from simbench.faults.estimate import PoseEvidence
+from simbench.faults.evidence import body_of, cameras_of, lidar_of
 from simbench.faults.mounts import drift_receipts, knock_receipts, settled
 from simbench.faults.receipt import Receipt, judge
 from simbench.faults.refit import Refit, refit_receipts
@@ -26,7 +23,6 @@ from simbench.faults.struck import struck
 from simbench.faults.tell import told_receipts
 from simbench.faults.telling import Witness
 from simbench.mount import BracketMotion
-from simbench.sensors import fiducials
 from simbench.sensors.rig import SensorRig
 
 
@@ -37,8 +33,9 @@ def receipts(
     if not faults:
         return ()
     drawn, measured = captured.drawn, captured.measured
-    seen, body = _evidence(captured, rig), _body(captured, rig)
-    evidence = tuple(_settled(item, drawn) for item in seen)
+    cameras, body = cameras_of(captured, rig), body_of(captured, rig)
+    evidence = tuple(_settled(item, drawn) for item in cameras)
+    seen = (*cameras, lidar_of(captured, rig)) if _lidar_moves(captured, rig, faults) else cameras
     result: list[Receipt] = []
     if (offset := faults.get(TriggerOffset)) is not None:
         result += timing_fault.receipts(offset, struck(offset, rig), drawn.delays_ns, evidence, body)
@@ -46,7 +43,8 @@ def receipts(
         fault, spec = shaken
         result += fault.receipts(spec, drawn.body_shake, duration_s, body, evidence)
     if (bend := faults.get(Flex)) is not None:
-        result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, evidence, body)
+        bent = tuple(_settled(item, drawn) for item in seen)
+        result += motion_fault.flex_receipts(bend, struck(bend, rig), drawn.flex, duration_s, bent, body)
     if (knock := faults.get(Knock)) is not None:
         rest = _rest(drawn.flex, drawn.drifts)
         result += knock_receipts(
@@ -84,9 +82,16 @@ def _nothing_measured(spec: FaultSpec) -> Receipt:
     )  # fmt: skip
 
 
-def _settled(item: CameraEvidence, drawn: Drawn) -> CameraEvidence:
-    """A camera's evidence less the knock and the drift of its bracket, which have receipts of their own."""
-    found = [motions[item.camera] for motions in (drawn.knocks, drawn.drifts) if item.camera in motions]
+def _lidar_moves(captured: Captured, rig: SensorRig, faults: FaultSet) -> bool:
+    """Whether a bracket fault names the LiDAR, or something moves its bracket that should not."""
+    brackets = [spec for kind in (Flex, Knock, Drift) if (spec := faults.get(kind)) is not None]
+    asked = any(rig.lidar_name in struck(spec, rig) for spec in brackets)
+    return asked or (bool(brackets) and rig.lidar_name in captured.motion.flex)
+
+
+def _settled(item: PoseEvidence, drawn: Drawn) -> PoseEvidence:
+    """A sensor's evidence less the knock and the drift of its bracket, which have receipts of their own."""
+    found = [motions[item.sensor] for motions in (drawn.knocks, drawn.drifts) if item.sensor in motions]
     if not found:
         return item
     turn_rad, shift_m = settled(item, found)
@@ -100,49 +105,3 @@ def _rest(*drawn: Mapping[str, BracketMotion]) -> dict[str, list[BracketMotion]]
         for name, motion in motions.items():
             rest.setdefault(name, []).append(motion)
     return rest
-
-
-def _body(captured: Captured, rig: SensorRig) -> BodyAttitude | None:
-    """The body's attitude by the gyro; None where the rig has none."""
-    if rig.imu is None:
-        return None
-    gyro = captured.measured.motions
-    R_ego, _ = captured.motion.ego(np.array([m.stamp_ns for m in gyro], dtype=np.int64))
-    return gyro_attitude(gyro, np.arctan2(R_ego[:, 1, 0], R_ego[:, 0, 0]), rig.imu.gyro_noise_dps_rthz)
-
-
-def _evidence(captured: Captured, rig: SensorRig) -> tuple[CameraEvidence, ...]:
-    """Per camera, PnP on the known points of every frame, against the pose that the script predicts: the
-    place at the nominal mid-exposure, the attitude at the true one.
-    """
-    script = captured.script
-    result = []
-    for name, camera in rig.pinholes.items():
-        taken = [shot.truth for shot in captured.measured.shots[name]]
-        mid_ns = captured.timing[name].mid_ns
-        taken_ns = np.array([image.capture_ns for image in taken], dtype=np.int64)
-        R_ego, _ = script.ego(mid_ns)
-        R_ego_taken, _ = script.ego(taken_ns)
-        _, expected_m = script.sensor(name, mid_ns)
-        attitude, _ = script.sensor(name, taken_ns)
-        turns, shifts = [], []
-        for f, image in enumerate(taken):
-            # Surveyed points that lie in the real view: a camera may look far from where it should.
-            field = fiducials.points_m(camera, image.T_world_camera)
-            uv = project_points(field, image.T_world_camera.inverse(), camera)
-            rotation, position = camera_pose(field, uv, camera)
-            turns.append(rotation_log(R_ego_taken[f].T @ rotation @ attitude[f].T @ R_ego_taken[f]))
-            shifts.append(R_ego[f].T @ (position - expected_m[f]))
-        result.append(
-            CameraEvidence(
-                camera=name,
-                taken_ns=taken_ns,
-                turn_rad=np.array(turns),
-                shift_m=np.array(shifts),
-                R_ego_camera=rig.T_ego_sensor[name].rotation,
-                position_ego_m=rig.T_ego_sensor[name].translation_m,
-                pivot_ego_m=np.array(script.pivot_m),
-                speed_mps=script.world.actors[script.ego_actor].track.speed_at(mid_ns),
-            )
-        )
-    return tuple(result)

@@ -19,7 +19,7 @@ from scenarios.seeding import stream
 from scenarios.severity import Profile
 from simbench.dynamics.ride import Overturned, Ride, drive_over
 from simbench.dynamics.road import ROUGHNESS_M3, draw_road
-from simbench.faults.estimate import BodyAttitude, CameraEvidence, detrended, gain
+from simbench.faults.estimate import BodyAttitude, PoseEvidence, detrended, gain
 from simbench.faults.motion import AXES, TO_DEG_AND_M, drawn_rms, found_rms, shake_sizes
 from simbench.faults.receipt import Receipt, judge
 from simbench.motion import PIVOT_M
@@ -83,7 +83,7 @@ def road_receipts(
     realised: Ride | None,
     duration_s: float,
     body: BodyAttitude | None,
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
 ) -> tuple[Receipt, ...]:
     """The class of the road, and roll, pitch and heave wherever the vehicle has them."""
     if realised is None:

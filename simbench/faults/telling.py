@@ -8,7 +8,7 @@ from typing import Any
 
 from fusion.messages import Calibration
 from scenarios.faults import FaultSpec
-from simbench.faults.estimate import BodyAttitude, CameraEvidence
+from simbench.faults.estimate import BodyAttitude, PoseEvidence
 from simbench.faults.receipt import Receipt
 
 
@@ -49,7 +49,7 @@ class Witness:
     (None where there is none)."""
 
     place: Place
-    evidence: Sequence[CameraEvidence]
+    evidence: Sequence[PoseEvidence]
     body: BodyAttitude | None
 
 

@@ -14,7 +14,7 @@ from jaxtyping import Float64, Int64
 
 from scenarios.faults import TriggerOffset
 from scenarios.seeding import stream
-from simbench.faults.estimate import BodyAttitude, CameraEvidence, SlowEgo, capture_delay_ms, gain
+from simbench.faults.estimate import BodyAttitude, PoseEvidence, SlowEgo, capture_delay_ms, gain
 from simbench.faults.receipt import Receipt, judge, untouched
 
 KEY = "timing.trigger_offset_ms"
@@ -33,7 +33,7 @@ def receipts(
     spec: TriggerOffset,
     cameras: Sequence[str],
     realised_ns: Mapping[str, Int64[np.ndarray, " f"]],
-    evidence: Sequence[CameraEvidence],
+    evidence: Sequence[PoseEvidence],
     body: BodyAttitude | None,
 ) -> tuple[Receipt, ...]:
     """Per struck camera the mean delay and, where there is jitter, its SD, found frame by frame. Where the
@@ -42,16 +42,16 @@ def receipts(
     result: list[Receipt] = []
     others: list[tuple[float, float]] = []
     for item in evidence:
-        struck = item.camera in cameras
-        drawn_ms = realised_ns.get(item.camera, np.zeros(item.frames, dtype=np.int64)) * 1e-6
+        struck = item.sensor in cameras
+        drawn_ms = realised_ns.get(item.sensor, np.zeros(item.frames, dtype=np.int64)) * 1e-6
         try:
             found_ms, one_sd_ms = capture_delay_ms(item, body)
         except SlowEgo as why:
             if struck:
-                result += _of_one(spec, item.camera, drawn_ms, None, 0.0, str(why))
+                result += _of_one(spec, item.sensor, drawn_ms, None, 0.0, str(why))
             continue
         if struck:
-            result += _of_one(spec, item.camera, drawn_ms, found_ms, one_sd_ms, NOTE)
+            result += _of_one(spec, item.sensor, drawn_ms, found_ms, one_sd_ms, NOTE)
         else:
             others.append((float(np.abs(found_ms).max()), max(one_sd_ms, FLOOR_MS)))
     result += untouched(fault=KEY, quantity="delay of the other cameras", unit="ms", found=others, note=NOTE)

@@ -20,7 +20,7 @@ from scenarios.fault_set import FaultSet
 from scenarios.faults import EdgeError, StaleFrames
 from scenarios.faults.lidar import BeamLoss
 from simbench.faults import detector as detector_fault
-from simbench.faults.estimate import CameraEvidence, camera_pose
+from simbench.faults.estimate import PNP, PoseEvidence, camera_pose
 from simbench.faults.receipt import Receipt, judge
 from simbench.faults.tell import asks_to_tell, told_receipts
 from simbench.faults.telling import Place, Witness
@@ -73,7 +73,7 @@ def recorded_receipts(
     return tuple(result)
 
 
-def _evidence(recording: Recording) -> CameraEvidence:
+def _evidence(recording: Recording) -> PoseEvidence:
     """The camera's attitude in every frame by PnP on known points, against the calibration."""
     truth = recording.truth
     camera, T_ego_camera = truth.calibration.cameras[CAMERA], truth.calibration.T_ego_sensor[CAMERA]
@@ -84,12 +84,12 @@ def _evidence(recording: Recording) -> CameraEvidence:
         rotation, _ = camera_pose(known, uv, camera)
         turns.append(rotation_log(rotation @ T_ego_camera.rotation.T))
     n = len(truth.images)
-    return CameraEvidence(
-        camera=CAMERA,
+    return PoseEvidence(
+        sensor=CAMERA,
+        by=PNP,
         taken_ns=np.array([image.capture_ns for image in truth.images], dtype=np.int64),
         turn_rad=np.array(turns),
         shift_m=np.zeros((n, 3)),
-        R_ego_camera=T_ego_camera.rotation,
         position_ego_m=T_ego_camera.translation_m,
         pivot_ego_m=np.zeros(3),
         speed_mps=np.zeros(n),

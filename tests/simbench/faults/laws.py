@@ -97,8 +97,10 @@ def _shots(camera: str, place: Site) -> tuple[Shot, ...]:
                     T_world_camera=Transform.identity(),
                     boxes=tuple(
                         TrueBox(
-                            object_id=o.object_id, amodal_px=(0.0, 0.0, 10.0, 120.0),
-                            visible_px=(0.0, 0.0, 10.0, float(tall_px[i])), visible_fraction=float(visible[i]),
+                            object_id=o.object_id,
+                            amodal_px=(0.0, 0.0, 10.0, 120.0),
+                            visible_px=(0.0, 0.0, 10.0, float(tall_px[i])),
+                            visible_fraction=float(visible[i]),
                         )
                         for i, o in enumerate(traffic)
                     ),
