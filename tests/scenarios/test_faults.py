@@ -210,7 +210,7 @@ def test_a_fault_set_may_be_a_file(tmp_path: Path) -> None:
         ("motion.flex_deg={rms: 1}", "did you mean 'rms_deg'?"),
         ("motion.flex_deg={rms_deg: 1", "not YAML"),
         ("motion.flex_deg={stiffness: sof}", "did you mean 'soft'?"),
-        ("motion.flex_deg={sensors: cam-front}", "allowed: cameras or a list"),
+        ("motion.flex_deg={sensors: cam-front}", "allowed: cameras, lidar or a list"),
         ("motion.flex_deg={sensors: []}", "names no camera"),
         ("motion.flex_deg={sensors: [a, a]}", "names a camera twice"),
         ("motion.flex_deg={uniform: [1, 2]}", "unknown key 'uniform'"),

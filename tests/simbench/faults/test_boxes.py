@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -170,7 +171,9 @@ def test_all_together_keep_their_receipts_and_their_draws() -> None:
         ("either", 40.0, 0.4, 0.8),  # found with 0.5 * 0.4
     ],
 )
-def test_how_hard_a_box_is_to_see_by_hand(by: str, height_px: float, visible: float, hard: float) -> None:
+def test_how_hard_a_box_is_to_see_by_hand(
+    by: Literal["either", "size", "visibility"], height_px: float, visible: float, hard: float
+) -> None:
     box = TrueBox(
         object_id=0, amodal_px=(0.0, 0.0, 9.0, 9.0), visible_px=(5.0, 7.0, 9.0, 7.0 + height_px),
         visible_fraction=visible,

@@ -10,7 +10,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from scenarios.fault_set import FaultSet, parse_fault_arguments
-from scenarios.faults import FAULTS, CalibrationMixup, FaultSpec, Trace, TriggerAngle
+from scenarios.faults import (
+    FAULTS,
+    CalibrationMixup,
+    Drift,
+    FaultSpec,
+    Flex,
+    Knock,
+    Trace,
+    TriggerAngle,
+)
 from scenarios.faults.motion import SHAKERS
 from scenarios.severity import SEVERITIES, severe
 from simbench.faults.receipt import MISMATCH
@@ -37,7 +46,8 @@ def struck(specs: tuple[FaultSpec, ...], system: str) -> Stage:
 
 @st.composite
 def sets(draw: st.DrawFn) -> tuple[FaultSpec, ...]:
-    """Up to six faults at any severity; of those that shake the body one at most."""
+    """Up to six faults at any severity, brackets of cameras or of the LiDAR; of those that shake the body one
+    at most."""
     names = draw(
         st.lists(st.sampled_from([*GRADED, "calibration.mixup"]), min_size=1, max_size=6, unique=True)
     )
@@ -47,6 +57,8 @@ def sets(draw: st.DrawFn) -> tuple[FaultSpec, ...]:
             continue
         mixup = name == "calibration.mixup"
         specs.append(draw(st.sampled_from(MIXUPS)) if mixup else severe(name, draw(st.integers(1, 5))))
+        if isinstance(specs[-1], Drift | Flex | Knock) and draw(st.booleans()):
+            specs[-1] = specs[-1].model_copy(update={"sensors": "lidar"})
     return tuple(specs)
 
 
