@@ -18,7 +18,7 @@ from click.core import ParameterSource
 from simbench.commands.check import check
 from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
-from simbench.commands.options import DEFAULT, OF_THE_PAPER, seeds_of
+from simbench.commands.options import DEFAULT, OF_THE_PAPER, cluster_option, seeds_of
 
 if TYPE_CHECKING:
     from simbench.case import Boxes, Images, Job, JobResult
@@ -268,7 +268,7 @@ def _execute(planned: list[Job], out: Path, images: Images, workers: int | None,
     import os
 
     from simbench import results as result_files
-    from simbench.campaign import run_jobs
+    from simbench.campaign.jobs import run_jobs
     from simbench.environment import environment
     from simbench.files import prepare_folder
     from simbench.formats.kitti import is_recorded
@@ -411,11 +411,12 @@ def _quoted(word: str) -> str:
 @click.option("--boxes", type=click.Choice(["labels", "model"]), default=None, help="As for run.")
 @click.option("--seeds", default="0-3", callback=seeds_of, show_default=True, help="Runs at every point.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
+@cluster_option
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/stress"), show_default=True)
 def stress(
     scenario: str, axes: tuple[str, ...], design: str, points: int, system: str | None,
     pipelines: tuple[str, ...], faults: tuple[str, ...], changes: tuple[str, ...], boxes: Boxes | None,
-    seeds: tuple[int, ...], jobs: int | None, out: Path,
+    seeds: tuple[int, ...], jobs: int | None, cluster: str | None, out: Path,
 ) -> None:  # fmt: skip
     """Run a scenario over a grid of errors, or of anything in its file; write stress.html and stress.csv.
 
@@ -429,7 +430,7 @@ def stress(
     code = run_stress(
         scenario, axes, design=design, points=points, system=system,
         pipelines=tuple(dict.fromkeys(pipelines)) or DEFAULT, faults=faults, changes=changes, boxes=boxes,
-        seeds=seeds, workers=jobs, out=out,
+        seeds=seeds, workers=jobs, cluster=cluster, out=out,
     )  # fmt: skip
     raise SystemExit(code)
 

@@ -25,13 +25,33 @@ def write_text(path: Path, text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: Path, data: bytes) -> None:
+def write_artifact(path: Path, data: bytes) -> None:
+    """`write_bytes`, and on the disk when it returns: after a power failure there is all of it or nothing."""
+    write_bytes(path, data, durable=True)
+
+
+def write_bytes(path: Path, data: bytes, *, durable: bool = False) -> None:
     """Write under a temporary name, then rename. BadInput where the place cannot be written."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        temporary.write_bytes(data)
+        with temporary.open("wb") as file:
+            file.write(data)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
         temporary.replace(path)
+        if durable:
+            _sync_folder(path.parent)
     except OSError as error:
         with suppress(OSError):  # best effort: the first error is the one to tell
             temporary.unlink()
         raise BadInput(f"cannot write {path}: {error.strerror or error}") from error
+
+
+def _sync_folder(folder: Path) -> None:
+    """A name is on the disk once its folder is."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -12,6 +12,7 @@ from shlex import join
 import click
 
 from scenarios.errors import BadInput
+from simbench.campaign.lock import only_one
 from simbench.case import Boxes
 from simbench.explain.answer import answer
 from simbench.explain.causes import question_of_scenario
@@ -73,10 +74,11 @@ def run_explain(
         "changes": list(changes), "boxes": boxes,
     }  # fmt: skip
     progress = _Progress(len(question.seeds))
-    measured = Measured(question, Ledger(out, what), workers or os.cpu_count() or 1, progress.done)
-    progress.measured = measured
     begun = time.perf_counter()
-    found = answer(measured, progress.planned)
+    with only_one(out), Ledger(out, what) as ledger:
+        measured = Measured(question, ledger, workers or os.cpu_count() or 1, progress.done)
+        progress.measured = measured
+        found = answer(measured, progress.planned)
     wall_s = time.perf_counter() - begun
     click.echo(f"{question.title}. {sentence(question, found)}\n")
     for line in as_text(found):

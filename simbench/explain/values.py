@@ -37,7 +37,7 @@ class Measured:
     def missing(self, masks: Sequence[int]) -> int:
         """How many recordings these sets need that the ledger does not hold."""
         points = [members(mask, self.question.causes) for mask in masks]
-        return sum((p, seed) not in self._ledger.done for p in points for seed in self.question.seeds)
+        return self._ledger.missing((p, self.question.job(s, p)) for p in points for s in self.question.seeds)
 
     def measure(self, masks: Sequence[int]) -> None:
         """Run these sets with every seed, where that is not known yet."""

@@ -7,6 +7,7 @@ import re
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from shlex import join
 from typing import Any
@@ -15,6 +16,7 @@ import click
 
 from scenarios.errors import Where
 from scenarios.seeding import stream
+from simbench.campaign.lock import only_one
 from simbench.case import ORACLE, Boxes, Job
 from simbench.files import prepare_folder, write_text
 from simbench.frontier.question import Question, margins_of, questions
@@ -71,25 +73,29 @@ def run_frontier(
         "faults": list(faults), "changes": list(changes), "boxes": boxes or "model",
     }  # fmt: skip
     begun, found, statuses, count = time.perf_counter(), [], set[str](), 0
-    for axis in parsed:
-        bench = _Bench(
-            axis, template, sorted(seeds), asked, _folder(out, axis), workers or os.cpu_count() or 1
-        )
-        answers = search(
-            bench.measure,
-            [question.key for question in deciding],
-            goal,
-            lambda key, name=axis.name: stream(0, "frontier", name, key),  # type: ignore[misc]
-        )
-        found += [
-            Requirement(axis=axis, question=q, goal=goal, found=answers[q.key], seeds=tuple(sorted(seeds)))
-            for q in asked
-        ]
-        for item in found[-len(asked) :]:
-            _tell(item)
-        statuses |= {outcome.status for outcome in bench.outcomes}
-        count += len(bench.outcomes) // (len(pipelines) + 1)
-        write_text(bench.folder / "runs.csv", runs_as_csv((axis,), bench.outcomes))
+    with only_one(out), ExitStack() as held:
+        for axis in parsed:
+            bench = _Bench(
+                axis, template, sorted(seeds), asked, _folder(out, axis), workers or os.cpu_count() or 1
+            )
+            held.enter_context(bench.ledger)
+            answers = search(
+                bench.measure,
+                [question.key for question in deciding],
+                goal,
+                lambda key, name=axis.name: stream(0, "frontier", name, key),  # type: ignore[misc]
+            )
+            found += [
+                Requirement(
+                    axis=axis, question=q, goal=goal, found=answers[q.key], seeds=tuple(sorted(seeds))
+                )
+                for q in asked
+            ]
+            for item in found[-len(asked) :]:
+                _tell(item)
+            statuses |= {outcome.status for outcome in bench.outcomes}
+            count += len(bench.outcomes) // (len(pipelines) + 1)
+            write_text(bench.folder / "runs.csv", runs_as_csv((axis,), bench.outcomes))
     write_text(out / "requirements.yaml", as_yaml(found, about))
     write_text(out / "requirements.csv", as_csv(found, about))
     page = write_page(
@@ -160,14 +166,14 @@ class _Bench:
             "pipelines": list(template.pipelines), "faults": list(template.faults),
             "changes": list(template.changes), "boxes": template.boxes,
         }  # fmt: skip
-        self._ledger = Ledger(folder, what)
+        self.ledger = Ledger(folder, what)
 
     def measure(self, levels: Sequence[float]) -> Sequence[Margins]:
         """The margins of all runs at some levels (0 to 1 of the range)."""
         low, high = self.axis.ends
         plan = _plan(self.axis, [float(f"{low + level * (high - low):.6g}") for level in levels])
         tasks = jobs_of(plan, self._template, self._seeds)
-        fresh = sum((point, job.seed) not in self._ledger.done for point, job in tasks)
+        fresh = self.ledger.missing(tasks)
         if fresh < len(tasks):
             click.echo(f"{len(tasks) - fresh} of {len(tasks)} recordings are there already", err=True)
         begun, told = time.perf_counter(), [0]
@@ -179,7 +185,7 @@ class _Bench:
             words = f"{at(plan.axes, outcomes[0].point)}, seed {outcomes[0].seed}: {statuses}"
             click.echo(f"[{told[0]}/{fresh}] {words} ({left_s / 60:.1f} min left in this round)", err=True)
 
-        outcomes = measure(tasks, self._ledger, self._workers, done)
+        outcomes = measure(tasks, self.ledger, self._workers, done)
         self.outcomes += outcomes
         by_point: dict[Point, list[Outcome]] = {point: [] for point in plan.points}
         for outcome in outcomes:

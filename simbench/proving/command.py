@@ -10,7 +10,7 @@ import click
 
 from scenarios.errors import Where
 from scenarios.faults import FAULTS
-from simbench.campaign import each_of
+from simbench.campaign.jobs import each_of
 from simbench.outcome import FAILED, GOOD
 from simbench.proving.prove import Drawn, Proof, Trials, honest_draws, proof_of, trials
 from simbench.proving.table import lines

@@ -5,12 +5,15 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from shlex import join
 from typing import cast
 
 import click
 
+from simbench.campaign.executor import check_cluster
+from simbench.campaign.lock import only_one
 from simbench.case import Boxes, Job
 from simbench.files import prepare_folder, write_text
 from simbench.outcome import exit_code
@@ -18,8 +21,8 @@ from simbench.plugins import load_pipeline
 from simbench.report.stress_page import at, write_page
 from simbench.stage import stage
 from simbench.stress.axes import parse_axes
-from simbench.stress.ledger import Ledger, Outcome
-from simbench.stress.plan import Design, grid, jobs_of, scattered
+from simbench.stress.ledger import Ledger, Outcome, Task
+from simbench.stress.plan import Design, Plan, grid, jobs_of, scattered
 from simbench.stress.run import measure
 from simbench.stress.table import as_csv
 
@@ -37,11 +40,13 @@ def run_stress(
     boxes: Boxes | None,
     seeds: tuple[int, ...],
     workers: int | None,
+    cluster: str | None,
     out: Path,
 ) -> int:
     """The exit code: 0 all well, 1 a pipeline failed somewhere, 3 the bench did. Raises BadInput."""
     from scenarios.load import load_scenario
 
+    check_cluster(cluster)
     parsed = parse_axes(axes)
     plan = grid(parsed) if design == "grid" else scattered(parsed, points, cast(Design, design))
     for name in pipelines:
@@ -60,8 +65,15 @@ def run_stress(
         "points": len(plan.points), "pipelines": list(pipelines), "faults": list(faults),
         "changes": list(changes), "boxes": boxes,
     }  # fmt: skip
-    ledger = Ledger(out, what)
-    fresh = sum((point, job.seed) not in ledger.done for point, job in tasks)
+    with only_one(out), Ledger(out, what) as ledger:
+        return _measured(plan, tasks, ledger, workers or os.cpu_count() or 1, cluster, out, family.name)
+
+
+def _measured(
+    plan: Plan, tasks: Sequence[Task], ledger: Ledger, workers: int, cluster: str | None, out: Path, name: str
+) -> int:
+    """Measure what is missing, write all; the exit code."""
+    fresh = ledger.missing(tasks)
     begun, told = time.perf_counter(), [0]
     if fresh < len(tasks):
         click.echo(f"{len(tasks) - fresh} of {len(tasks)} recordings are there already", err=True)
@@ -73,12 +85,15 @@ def run_stress(
         words = f"{at(plan.axes, outcomes[0].point)}, seed {outcomes[0].seed}: {statuses}"
         click.echo(f"[{told[0]}/{fresh}] {words} ({left_s / 60:.1f} min left)", err=True)
 
-    outcomes = measure(tasks, ledger, workers or os.cpu_count() or 1, done)
+    unused = len(ledger.rows) - (len(tasks) - fresh)
+    if unused:
+        click.echo(f"{unused} others there are of other seeds, files or code: not used", err=True)
+    outcomes = measure(tasks, ledger, workers, done, cluster)
     wall_s = time.perf_counter() - begun
     write_text(out / "stress.csv", as_csv(plan.axes, outcomes))
     page = write_page(
         plan, outcomes, {(point, job.seed): job for point, job in tasks}, out,
-        title=f"{family.name}, {template.system}", command=join(["simbench", *sys.argv[1:]]),
+        title=f"{name}, {tasks[0][1].system}", command=join(["simbench", *sys.argv[1:]]),
         wall_s=wall_s, fresh=fresh,
     )  # fmt: skip
     click.echo(f"report: {page}")

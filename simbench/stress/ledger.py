@@ -1,22 +1,24 @@
-"""What a stress test has measured so far: a file that grows line by line, so that it can go on after a stop.
-
-One line of JSON per recording, written whole and flushed to disk; a last line that was cut off counts as not
-measured. The first line says what is measured: a ledger of another test is refused.
-"""
+"""What a stress test has measured so far, in the words of a stress test: a campaign's ledger, one row per
+recording."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import BadInput
+from simbench.campaign.job_key import job_key
+from simbench.campaign.ledger import NAME as NAME
+from simbench.campaign.ledger import Done
+from simbench.campaign.ledger import Ledger as Rows
+from simbench.case import ORACLE, Job
+from simbench.score.metrics import METRICS
 from simbench.stress.axes import Point, Value
 
-NAME = "ledger.jsonl"
+Task = tuple[Point, Job]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,43 +37,72 @@ class Outcome:
 
 
 class Ledger:
-    """A ledger in a folder. BadInput: the one that lies there belongs to another test."""
+    """A ledger in a folder. BadInput: the one that lies there belongs to another test, or is damaged."""
 
     def __init__(self, folder: Path, what: Mapping[str, Any]) -> None:
-        self._path, self._head = folder / NAME, json.dumps({"stress": what}, sort_keys=True)
-        self.done: dict[tuple[Point, int], tuple[Outcome, ...]] = {}
-        if self._path.exists():
-            self._read()
-        else:
-            self._append(self._head)
+        self.rows = Rows(folder, what, kind="stress test")
 
-    def _read(self) -> None:
-        text = self._path.read_text(encoding="utf-8")
-        whole = text[: text.rfind("\n") + 1]
-        lines = whole.splitlines()
-        if not lines or lines[0] != self._head:
-            raise BadInput(
-                f"{self._path} holds another stress test; give another --out, or remove it to start anew"
-            )
-        for number, line in enumerate(lines[1:], start=2):
-            try:
-                outcomes = tuple(_outcome(entry) for entry in json.loads(line))
-                self.done[(outcomes[0].point, outcomes[0].seed)] = outcomes
-            except (ValueError, TypeError, KeyError, IndexError) as error:
-                raise BadInput(f"{self._path}, line {number}: is no outcome of a stress test") from error
-        if len(whole) < len(text):  # cut off while it was written
-            os.truncate(self._path, len(whole.encode("utf-8")))
+    def __enter__(self) -> Ledger:
+        return self
 
-    def add(self, outcomes: tuple[Outcome, ...]) -> None:
+    def __exit__(self, *_: object) -> None:
+        self.rows.close()
+
+    def __contains__(self, task: Task) -> bool:
+        """Whether it holds a recording, made by this code and of these files."""
+        return key_of(task) in self.rows
+
+    def missing(self, tasks: Iterable[Task]) -> int:
+        """How many recordings it does not hold."""
+        return sum(task not in self for task in tasks)
+
+    def add(self, task: Task, outcomes: tuple[Outcome, ...]) -> None:
         """Keep the outcomes of one recording."""
-        self.done[(outcomes[0].point, outcomes[0].seed)] = outcomes
-        self._append(json.dumps([asdict(outcome) for outcome in outcomes], allow_nan=False))
+        self.rows.add(Done(key=key_of(task), value=as_text(outcomes)), len(self.rows))
 
-    def _append(self, line: str) -> None:
-        with self._path.open("a", encoding="utf-8") as file:
-            file.write(line + "\n")
-            file.flush()
-            os.fsync(file.fileno())
+    def outcomes(self, task: Task, row: Done) -> tuple[Outcome, ...]:
+        """What a row says of a recording. One without an answer is a failure of the bench in all of its
+        pipelines. BadInput: the row is of something else."""
+        if row.value is None:
+            return _failed(task, row)
+        try:
+            return tuple(_outcome(entry) for entry in json.loads(row.value))
+        except (ValueError, TypeError, KeyError) as error:
+            raise BadInput(f"{self.rows.path}: a row is no outcome of a stress test") from error
+
+
+def key_of(task: Task) -> str:
+    """The key of a recording."""
+    point, job = task
+    return job_key(job, point=point)
+
+
+def as_text(outcomes: tuple[Outcome, ...]) -> str:
+    """The JSON text of a row."""
+    return json.dumps([asdict(outcome) for outcome in outcomes], allow_nan=False)
+
+
+def _failed(task: Task, row: Done) -> tuple[Outcome, ...]:
+    point, job = task
+    return tuple(
+        Outcome(
+            point=point,
+            seed=job.seed,
+            pipeline=name,
+            status="timeout" if row.status == "timeout" else "bench_error",
+            why=row.failure,
+            values={metric.name: None for metric in METRICS},
+            command=_command(job, name),
+            seconds={},
+        )
+        for name in (*job.pipelines, ORACLE)
+    )
+
+
+def _command(job: Job, pipeline: str) -> str:
+    from simbench.results import reproduce
+
+    return reproduce(job, job.pipelines if pipeline == ORACLE else (pipeline,))
 
 
 def _outcome(entry: Mapping[str, Any]) -> Outcome:

@@ -5,20 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from scenarios.faults.motion import SHAKERS
-from simbench.campaign import each_of
+from simbench.campaign.executor import open_executor
+from simbench.campaign.ledger import Done
+from simbench.campaign.run import campaign
 from simbench.case import Job, JobResult
 from simbench.results import reproduce
 from simbench.run import run_job
 from simbench.stress.axes import Point
-from simbench.stress.ledger import Ledger, Outcome
+from simbench.stress.ledger import Ledger, Outcome, Task, as_text, key_of
 
 SHAKING = tuple(spec.name for spec in SHAKERS)
 
 
-def outcomes_of(task: tuple[Point, Job]) -> tuple[Outcome, ...]:
+def outcomes_of(task: Task) -> tuple[Outcome, ...]:
     """All pipelines and the oracle on one recording."""
     point, job = task
     return summarised(point, run_job(job))
+
+
+def row_of(task: Task) -> str:
+    """The same as the text that the ledger keeps."""
+    return as_text(outcomes_of(task))
 
 
 def summarised(point: Point, result: JobResult) -> tuple[Outcome, ...]:
@@ -45,17 +52,20 @@ def _drive(job: Job) -> tuple[int, tuple[str, ...], tuple[str, ...]]:
 
 
 def measure(
-    tasks: Sequence[tuple[Point, Job]],
+    tasks: Sequence[Task],
     ledger: Ledger,
     workers: int,
     done: Callable[[tuple[Outcome, ...]], None] = lambda _: None,
+    cluster: str | None = None,
 ) -> tuple[Outcome, ...]:
     """Run what the ledger does not hold yet; the outcomes of all tasks, in their order."""
-    missing = sorted(
-        (task for task in tasks if (task[0], task[1].seed) not in ledger.done),
-        key=lambda task: _drive(task[1]),
-    )
-    for outcomes in each_of(outcomes_of, missing, workers):
-        ledger.add(outcomes)
-        done(outcomes)
-    return tuple(outcome for point, job in tasks for outcome in ledger.done[(point, job.seed)])
+    ordered = sorted(tasks, key=lambda task: _drive(task[1]))
+    keys = {key_of(task): task for task in ordered}
+
+    def told(row: Done) -> None:
+        done(ledger.outcomes(keys[row.key], row))
+
+    useful = max(1, min(workers, ledger.missing(ordered)))
+    with open_executor(useful, cluster if ledger.missing(ordered) else None) as executor:
+        rows = {row.key: row for row in campaign(row_of, ordered, key_of, executor, ledger.rows, told)}
+    return tuple(outcome for task in tasks for outcome in ledger.outcomes(task, rows[key_of(task)]))

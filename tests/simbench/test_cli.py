@@ -236,7 +236,7 @@ def test_a_bad_file_is_one_sentence_with_file_and_line(empty_folder: Path, which
 def test_an_output_that_cannot_be_written_is_refused_before_the_run(empty_folder: Path) -> None:
     (empty_folder / "file").write_text("", encoding="utf-8")
     for out in ("file", "file/below"):
-        with mock.patch("simbench.campaign.run_jobs", side_effect=AssertionError("it ran")):
+        with mock.patch("simbench.campaign.jobs.run_jobs", side_effect=AssertionError("it ran")):
             done = run("run", "overtake-approach", "--seeds", "0", *NONE, "--out", out)
         refused(done, "cannot write to", out)
     assert [path.name for path in empty_folder.iterdir()] == ["file"]

@@ -16,7 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 from scenarios.load import load_scenario
-from simbench.campaign import run_jobs
+from simbench.campaign.jobs import run_jobs
 from simbench.case import Job, JobResult
 from simbench.results import document, reproduce, write
 from simbench.score.metrics import METRICS

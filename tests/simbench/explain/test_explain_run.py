@@ -28,6 +28,7 @@ from simbench.explain.values import Measured, value_of
 from simbench.stage import Stage, stage
 from simbench.stress.ledger import NAME, Ledger, Outcome
 from simbench.switches import SWITCHES, switched
+from tests.simbench.campaign.support import keep_first, rows_in
 from tests.simbench.cheats import named
 from tests.simbench.support import staged
 
@@ -126,10 +127,10 @@ def test_an_explanation_names_the_cause_and_goes_on_where_it_stopped(short: None
     assert len(parts) == 2 * 9  # of the pipeline and the oracle
     assert sum(parts[:8]) == pytest.approx(parts[8], abs=1e-9)
 
-    lines = (whole / NAME).read_text(encoding="utf-8").splitlines(keepends=True)
-    assert len(lines) == 1 + 4 * 3
+    assert len(rows_in(whole)) == 4 * 3
     stopped.mkdir()
-    (stopped / NAME).write_text("".join(lines[:6]) + lines[6][:40], encoding="utf-8")
+    (stopped / NAME).write_bytes((whole / NAME).read_bytes())
+    keep_first(stopped, 5)
     again = run(*WORDS, "--out", str(stopped))
     assert again.exit_code == 0 and "5 of 12 recordings are there already" in again.stderr
     assert (stopped / "explain.csv").read_bytes() == (whole / "explain.csv").read_bytes()
@@ -147,9 +148,9 @@ def test_the_runs_in_a_folder_are_explained_as_they_were(short: None, tmp_path: 
         assert case["off"] == ["bench.spin_phase"] and "--off bench.spin_phase" in case["command"]
     done = run("explain", str(tmp_path / "run"), "--jobs", "1", "--out", str(tmp_path / "why"))
     assert done.exit_code == 0, done.output
-    lines = (tmp_path / "why" / NAME).read_text(encoding="utf-8").splitlines()
-    assert len(lines) == 1 + 2 * 8  # two seeds; rotation, rolling scan, reference rate
-    outcomes = [json.loads(line)[0] for line in lines[1:]]
+    rows = rows_in(tmp_path / "why")
+    assert len(rows) == 2 * 8  # two seeds; rotation, rolling scan, reference rate
+    outcomes = [json.loads(value)[0] for _, value in rows.values()]
     full = [o for o in outcomes if len(o["point"]) == 3]
     with_faults = [c for c in cases if c["fault_specs"] and c["pipeline"] == "static_projection"]
     rows_of_run = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))["rows"]
@@ -223,7 +224,7 @@ def pretended(question: Question, folder: Path, losses: np.ndarray, noise: float
         point = members(mask, question.causes)
         for seed in question.seeds:
             values = outcome(point, seed, 0.9 - float(loss) + noise * rng.normal())
-            ledger.done[(point, seed)] = (values, replace(values, pipeline="oracle"))
+            ledger.add((point, question.job(seed, point)), (values, replace(values, pipeline="oracle")))
     return Measured(question, ledger)
 
 

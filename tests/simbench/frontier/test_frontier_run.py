@@ -19,7 +19,8 @@ from simbench.case import Job
 from simbench.cli import main
 from simbench.stage import Stage, stage
 from simbench.stress.axes import Point
-from simbench.stress.ledger import NAME, Outcome
+from simbench.stress.ledger import Outcome
+from tests.simbench.campaign.support import keep_first, rows_in
 from tests.simbench.support import staged
 
 OFFSET = "timing.trigger_offset_ms"
@@ -94,13 +95,12 @@ def test_the_same_command_goes_on_where_it_stopped_and_other_limits_use_the_same
     with bench():
         run(tmp_path, *words, *LIMITS)
         first = {name: (tmp_path / name).read_bytes() for name in ("requirements.yaml", "requirements.csv")}
-        ledger = tmp_path / OFFSET / NAME
-        lines = ledger.read_text(encoding="utf-8").splitlines(keepends=True)
-        ledger.write_text("".join(lines[:30]) + lines[30][:40], encoding="utf-8")
+        rows = rows_in(tmp_path / OFFSET)
+        keep_first(tmp_path / OFFSET, 29)
         again = run(tmp_path, *words, *LIMITS)
         assert "29 of 60 recordings are there already" in again.stderr
         assert first == {name: (tmp_path / name).read_bytes() for name in first}
-        assert ledger.read_text(encoding="utf-8").splitlines(keepends=True) == lines
+        assert rows_in(tmp_path / OFFSET) == rows
         other = run(tmp_path, *words, "--limit", "precision>=0.97")
     assert "60 of 60 recordings are there already" in other.stderr
 

@@ -12,11 +12,13 @@ import pytest
 from click.testing import CliRunner, Result
 
 from scenarios.errors import BadInput
+from simbench.campaign.ledger import Done
 from simbench.case import Job
 from simbench.cli import main
 from simbench.stage import Stage, stage
-from simbench.stress.ledger import NAME, Ledger, Outcome
+from simbench.stress.ledger import NAME, Ledger, Outcome, key_of
 from simbench.stress.table import cells, worst
+from tests.simbench.campaign.support import keep_first, rows_in
 from tests.simbench.cheats import named
 from tests.simbench.support import staged
 
@@ -42,6 +44,11 @@ WORDS = (
 )  # fmt: skip
 
 
+TASK = (
+    (1.0, "A"), Job(scenario="overtake-approach", system="car", seed=0, pipelines=("robust",)),
+)  # fmt: skip
+
+
 def run(*words: str) -> Result:
     return CliRunner().invoke(main, words, prog_name="simbench")
 
@@ -60,10 +67,10 @@ def test_a_stress_test_that_was_stopped_goes_on_to_the_same_table(short: None, t
     page = (whole / "stress.html").read_text(encoding="utf-8")
     assert "4 points of a grid, 2 seeds each" in page and "<script" not in page
     assert page.count('<svg class="plot"') == 6
-    lines = (whole / NAME).read_text(encoding="utf-8").splitlines(keepends=True)
-    assert len(lines) == 1 + 4 * 2
+    assert len(rows_in(whole)) == 4 * 2
     stopped.mkdir()
-    (stopped / NAME).write_text("".join(lines[:4]) + lines[4][:50], encoding="utf-8")
+    (stopped / NAME).write_bytes((whole / NAME).read_bytes())
+    keep_first(stopped, 3)
     second = run(*WORDS, "--out", str(stopped))
     assert second.exit_code == 0 and "3 of 8 recordings are there already" in second.stderr
     assert (stopped / "stress.csv").read_bytes() == (whole / "stress.csv").read_bytes()
@@ -74,8 +81,9 @@ def test_a_stress_test_that_was_stopped_goes_on_to_the_same_table(short: None, t
 
 
 def test_a_ledger_of_another_test_is_refused(short: None, tmp_path: Path) -> None:
-    Ledger(tmp_path, {"scenario": "one"})
-    with pytest.raises(BadInput, match="another stress test"):
+    with Ledger(tmp_path, {"scenario": "one"}):
+        pass
+    with pytest.raises(BadInput, match=r"another stress test \(other scenario\)"):
         Ledger(tmp_path, {"scenario": "two"})
     before = (tmp_path / NAME).read_bytes()
     refused = run(*WORDS, "--out", str(tmp_path))
@@ -83,19 +91,38 @@ def test_a_ledger_of_another_test_is_refused(short: None, tmp_path: Path) -> Non
     assert (tmp_path / NAME).read_bytes() == before
 
 
-@pytest.mark.parametrize("line", ["{broken", "[]", "3", "[3]", '[{"point": [1]}]'])
-def test_a_broken_line_of_a_ledger_costs_one_sentence(tmp_path: Path, line: str) -> None:
-    Ledger(tmp_path, {"a": 1})
-    with (tmp_path / NAME).open("a", encoding="utf-8") as file:
-        file.write(line + "\n")
-    with pytest.raises(BadInput, match="line 2: is no outcome"):
-        Ledger(tmp_path, {"a": 1})
+@pytest.mark.parametrize("value", ["{broken", "[3]", '[{"point": [1]}]', "3"])
+def test_a_row_that_is_no_outcome_costs_one_sentence(tmp_path: Path, value: str) -> None:
+    with Ledger(tmp_path, {"a": 1}) as ledger:
+        ledger.rows.add(Done(key=key_of(TASK), value=value), 0)
+        with pytest.raises(BadInput, match="a row is no outcome"):
+            ledger.outcomes(TASK, ledger.rows.get(key_of(TASK)))
 
 
 def test_a_ledger_gives_back_what_was_put_in(tmp_path: Path) -> None:
     kept = (outcome(tpr=0.5, precision=None), outcome("oracle", tpr=1.0))
-    Ledger(tmp_path, {"a": 1}).add(kept)
-    assert Ledger(tmp_path, {"a": 1}).done == {((1.0, "A"), 0): kept}
+    with Ledger(tmp_path, {"a": 1}) as ledger:
+        assert ledger.missing([TASK]) == 1
+        ledger.add(TASK, kept)
+    with Ledger(tmp_path, {"a": 1}) as again:
+        assert again.missing([TASK]) == 0 and again.outcomes(TASK, again.rows.get(key_of(TASK))) == kept
+
+
+def test_a_recording_whose_worker_died_is_a_failure_of_the_bench_in_all_its_pipelines(tmp_path: Path) -> None:
+    with Ledger(tmp_path, {"a": 1}) as ledger:
+        row = Done(key=key_of(TASK), value=None, failure="its worker died 3 times: signal 9", status="died")
+        ledger.rows.add(row, 0)
+        found = ledger.outcomes(TASK, ledger.rows.get(row.key))
+    assert [(o.pipeline, o.status, o.why) for o in found] == [
+        (name, "bench_error", row.failure) for name in ("robust", "oracle")
+    ]
+    assert not any(value is not None for o in found for value in o.values.values())
+
+
+@pytest.mark.parametrize("word", ["localhost", "here", ""])
+def test_a_cluster_that_is_no_address_costs_one_sentence(word: str, tmp_path: Path) -> None:
+    done = run(*WORDS, "--cluster", word, "--out", str(tmp_path))
+    assert done.exit_code == 2 and "allowed: tcp://HOST:PORT, local" in done.stderr
 
 
 def test_a_pipeline_that_fails_is_a_run_without_success_and_exit_code_1(short: None, tmp_path: Path) -> None:
@@ -105,7 +132,7 @@ def test_a_pipeline_that_fails_is_a_run_without_success_and_exit_code_1(short: N
     assert done.exit_code == 1, done.output
     page = (tmp_path / "stress.html").read_text(encoding="utf-8")
     assert "8 of 16 runs have no score" in page
-    entries = [json.loads(line) for line in (tmp_path / NAME).read_text().splitlines()[1:]]
+    entries = [json.loads(value) for _, value in rows_in(tmp_path).values()]
     assert {e["status"] for entry in entries for e in entry} == {"pipeline_error", "ok"}
 
 

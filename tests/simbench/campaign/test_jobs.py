@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import BadInput
 from scenarios.load import load_scenario
-from simbench.campaign import run_jobs
+from simbench.campaign.jobs import run_jobs
 from simbench.case import Job, JobResult
 from simbench.results import document
 from tests.simbench.cheats import named

@@ -1,19 +1,18 @@
-"""Many jobs on a few processes. Results come in the order of the jobs, whatever finishes first."""
+"""Many jobs on a few processes, nothing kept. Results come in the order of the jobs."""
 
 from __future__ import annotations
 
 import multiprocessing
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from typing import TypeVar
 
+from simbench.campaign.local import one_thread_each
 from simbench.case import Job, JobResult
 from simbench.run import run_job
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
-ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
 def run_jobs(
@@ -39,8 +38,7 @@ def each_of(work: Callable[[Task], Result], tasks: Sequence[Task], workers: int)
     if workers <= 1:
         yield from map(work, tasks)
         return
-    for name in ONE_THREAD:
-        os.environ.setdefault(name, "1")
+    one_thread_each()
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(max_workers=workers, mp_context=context) as pool:
         try:
