@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import math
 import os
 import threading
 import time
@@ -18,6 +19,8 @@ from simbench.campaign.died import TookTooLong, WorkerDied
 LOCAL = "local"
 ANSWER_S = 15.0
 """How long a scheduler may take to answer, and how long a lost one is looked for."""
+ASK_S = 2.0
+"""How old the number of workers may be."""
 EMPTY_S = 120.0
 """How long a cluster may be without any worker."""
 LEAVE_S = 0.5
@@ -40,10 +43,10 @@ class Cluster(Executor):
                 "a cluster needs dask.distributed, which is not installed: pip install 'simbench[cluster]'",
                 field="--cluster",
             ) from error
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told by us, once
+        _hush()
         self._timeout_s, self._address = timeout_s, address
         self._killed = distributed.scheduler.KilledWorker
-        self._seen_s = time.monotonic()
+        self._seen_s, self._width, self._asked_s = time.monotonic(), 1, -math.inf
         with ExitStack() as stack:
             settings = {
                 "distributed.comm.timeouts.connect": f"{ANSWER_S}s",
@@ -70,11 +73,19 @@ class Cluster(Executor):
 
     @property
     def width(self) -> int:
-        """How many tasks the workers that there are now can do at a time, at least 1."""
-        try:
-            return max(1, sum(self._client.nthreads().values()))
-        except (OSError, TimeoutError, RuntimeError, ValueError) as error:
-            raise self.lost() from error
+        """How many tasks the workers that there are can do at a time, at least 1. BadInput: it is lost, or
+        has workers of many threads, which would share what `simbench/reuse.py` keeps."""
+        if time.monotonic() - self._asked_s > ASK_S:
+            try:
+                threads = self._client.nthreads().values()
+            except (OSError, TimeoutError, RuntimeError, ValueError) as error:
+                raise self.lost() from error
+            if max(threads, default=1) > 1:
+                raise BadInput(
+                    f"a worker of {self._address} has {max(threads)} threads", allowed="--nthreads 1"
+                )
+            self._width, self._asked_s = max(1, len(threads)), time.monotonic()
+        return self._width
 
     def check(self) -> None:
         """Called now and then while nothing comes back. BadInput: it will not."""
@@ -118,6 +129,13 @@ class Cluster(Executor):
 
 
 KEPT = "what was measured is kept, and the same command goes on from there"
+
+
+def _hush() -> None:
+    """What goes wrong in dask is told by us, once."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _timed(

@@ -162,7 +162,7 @@ class LocalPool(Executor):
                     call.begun_s = now_s if call.begun_s is None else call.begun_s
                     if self._timeout_s is not None and now_s - call.begun_s > self._timeout_s:
                         self._settle(slot, call, TookTooLong(self._timeout_s))
-                    elif slot.exit_code() == 0:
+                    elif slot.left_quietly():
                         call.seen_gone += 1
                         if call.seen_gone > 2:  # its answer may have been on the way
                             self._settle(slot, call, WorkerDied(in_words(0)))
@@ -208,20 +208,21 @@ class _Slot:
             )
         call.inner = self.pool.schedule(call.fn, args=call.args, kwargs=call.kwargs)
 
-    def exit_code(self) -> int | None:
-        """Of the newest worker; None while it lives."""
-        newest = self._context.newest
-        return None if newest is None else newest.exitcode
+    def left_quietly(self) -> bool:
+        """Whether a worker of this pool ended with exit code 0, which no worker does whose pool is open."""
+        return any(process.exitcode == 0 for process in self._context.spawned)
 
 
 class _Remembers(SpawnContext):
-    """Spawns processes, and remembers the newest: pebble tells of no worker that ended with exit code 0."""
+    """Spawns processes, and remembers them: pebble replaces one that ended with exit code 0 without a word,
+    and its task would be waited for without end."""
 
-    newest: SpawnProcess | None = None
+    def __init__(self) -> None:
+        self.spawned: list[SpawnProcess] = []
 
     def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # type: ignore[override]
-        self.newest = SpawnProcess(*args, **kwargs)
-        return self.newest
+        self.spawned.append(SpawnProcess(*args, **kwargs))
+        return self.spawned[-1]
 
 
 def end_with(parent: int) -> None:

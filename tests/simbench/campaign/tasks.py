@@ -12,11 +12,13 @@ import sys
 import time
 from pathlib import Path
 
+from scenarios.load import load_scenario
 from simbench.campaign.executor import open_executor
 from simbench.campaign.key import task_key
 from simbench.campaign.ledger import Ledger
 from simbench.campaign.lock import only_one
 from simbench.campaign.run import campaign
+from simbench.case import Job
 
 ABOUT = {"campaign": "tiny"}
 
@@ -24,6 +26,12 @@ ABOUT = {"campaign": "tiny"}
 def tiny(number: int) -> str:
     """A row that says all about itself."""
     return json.dumps({"number": number, "square": number * number, "text": "x" * (number % 7)})
+
+
+def slow(number: int) -> str:
+    """The same, in 50 ms."""
+    time.sleep(0.05)
+    return tiny(number)
 
 
 def key_of(number: int) -> str:
@@ -45,6 +53,8 @@ def odd(task: tuple[str, str]) -> str:
         case "hang":
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             time.sleep(600)
+        case "hang on":
+            time.sleep(600)
         case "raise":
             raise KeyError(word)
         case "leave":
@@ -56,9 +66,20 @@ def odd(task: tuple[str, str]) -> str:
         case "tell":
             Path(word).write_text(str(os.getpid()), encoding="utf-8")
             time.sleep(600 if not Path(word + ".go").exists() else 0)
+        case "bad input":
+            load_scenario(word)
         case "number":
             return 3  # type: ignore[return-value]
     return json.dumps(task)
+
+
+def drive(job: Job) -> str:
+    """The rows of a real recording, all pipelines."""
+    from simbench.results import document
+    from simbench.run import run_job
+
+    content = document([run_job(job)], {})
+    return json.dumps({name: content[name] for name in ("rows", "cases")}, allow_nan=False)
 
 
 def main(folder: str, count: str, workers: str, cluster: str | None = None) -> None:
