@@ -2,7 +2,7 @@
 
     python -m tests.simbench.campaign.small_disk FOLDER limit|tmpfs
 
-limit: no file may grow above 300 kB. tmpfs: the ledger is made on 600 kB of memory of a mount of this process,
+limit: no file may grow above 300 kB. tmpfs: the ledger is made on 600 kB of memory, mounted for this process,
 and copied to FOLDER in the end. Exit code 77: nothing may be mounted.
 """
 

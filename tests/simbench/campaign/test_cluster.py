@@ -108,7 +108,7 @@ def test_a_poisoned_task_and_one_that_hangs_are_the_only_ones_to_fail_on_a_clust
 
 def test_nobody_there_costs_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("simbench.campaign.cluster.ANSWER_S", 0.5)
-    with pytest.raises(BadInput, match="no cluster answers at tcp://127.0.0.1:9"):
+    with pytest.raises(BadInput, match=r"no cluster answers at tcp://127\.0\.0\.1:9"):
         with open_executor(cluster="tcp://127.0.0.1:9"):
             pass
 
