@@ -13,6 +13,7 @@ from simbench.drive import Driven
 from simbench.exhibit import PairView
 from simbench.faults.receipt import Receipt
 from simbench.formats.scene import RecordedScene
+from simbench.isolate.limits import DEFAULT, Isolate, Limits
 from simbench.score.metrics import METRICS, Row
 from simbench.score.score import Scores
 
@@ -44,6 +45,8 @@ class Job:
     calibration: str = "true"  # as `--calibration` gives it
     off: tuple[str, ...] = ()  # what the bench leaves out (`switches.py`)
     found_in: str | None = None  # the file of the found calibration that the pipelines are told
+    isolate: Isolate = "users"  # which pipelines run in a process of their own
+    limits: Limits = DEFAULT  # of each of these processes
 
     @property
     def told(self) -> Told:

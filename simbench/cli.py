@@ -201,7 +201,7 @@ def run(
     from simbench.calibration.find import found_for
     from simbench.case import Job
     from simbench.formats.kitti import is_recorded
-    from simbench.plugins import load_pipeline
+    from simbench.isolate.ask import check_pipeline_name
     from simbench.stage import faults_of
 
     if not targets:
@@ -209,7 +209,7 @@ def run(
         raise SystemExit(NOTHING)
     chosen = tuple(dict.fromkeys(pipelines)) or DEFAULT
     for name in chosen:
-        load_pipeline(name)
+        check_pipeline_name(name)
     recorded = [target for target in dict.fromkeys(targets) if is_recorded(target)]
     planned = []
     if recorded and changes:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import sys
+import traceback
 from collections.abc import Callable
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -45,9 +46,11 @@ def load_pipeline(name: str) -> Factory:
     return cast(Factory, factory)
 
 
-def reads_images(name: str) -> bool:
-    """Whether a pipeline wants `CameraImage` messages: yes, unless its class says `reads_images = False`."""
-    return bool(getattr(load_pipeline(name), "reads_images", True))
+def last_line(error: BaseException) -> str:
+    """What a pipeline raised and where, on one line."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    text = " ".join(str(error).split())
+    return f"{type(error).__name__}: {text} (line {place.lineno} of {place.name})"
 
 
 def _from_reference(reference: str) -> Any:

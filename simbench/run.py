@@ -6,7 +6,6 @@ A `Job` makes one recording and runs every pipeline on it: a case is a job and a
 from __future__ import annotations
 
 import time
-import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
@@ -15,7 +14,7 @@ from scenarios.fault_set import FaultSet
 from scenarios.scenario import Scenario
 from simbench.case import ORACLE, Case, Job, JobResult, failed, scored
 from simbench.distances import Distances, distances
-from simbench.drive import drive
+from simbench.drive import Driven, drive
 from simbench.exhibit import PairView, pair_views
 from simbench.faults.draw import shake_words
 from simbench.faults.proof import receipts
@@ -23,7 +22,10 @@ from simbench.faults.receipt import MISMATCH, Receipt
 from simbench.formats.jobs import play_job
 from simbench.formats.kitti import is_recorded
 from simbench.formats.scene import RecordedScene
-from simbench.plugins import load_pipeline
+from simbench.isolate.ask import runs_apart
+from simbench.isolate.drive import drive_isolated
+from simbench.isolate.limits import Failed, Isolate, Limits, TimedOut
+from simbench.plugins import last_line, load_pipeline
 from simbench.recording import Recording
 from simbench.score.contract import ContractError
 from simbench.score.objects import score_objects, score_oracles
@@ -85,7 +87,7 @@ def _guarded(
             views=views, distances=curves, timings_s=clock.laps,
         )  # fmt: skip
     except Exception as error:  # a bug of ours must not end the other jobs, nor pass for a result
-        why = _last_line(error)
+        why = last_line(error)
         bad = tuple(failed(name, "bench_error", why) for name in (*job.pipelines, ORACLE))
         return JobResult(job=job, scenario=scenario, faults=faults, shake="", receipts=(), cases=bad)
 
@@ -103,7 +105,7 @@ def judge(
 ) -> tuple[tuple[Case, ...], tuple[PairView, ...], Distances]:
     """All pipelines and the oracle on a recording: no scores where a receipt does not match. `others`: whose
     distances are kept."""
-    cases = [run_case(name, made) for name in job.pipelines]
+    cases = [run_case(name, made, job.isolate, job.limits) for name in job.pipelines]
     clock.lap("fusion and scores")
     if made.recording.truth.target_id is not None:
         cases.append(scored(ORACLE, score_oracles(made.recording), None))
@@ -123,17 +125,35 @@ class HasRecording(Protocol):
     def recording(self) -> Recording: ...
 
 
-def run_case(name: str, made: HasRecording) -> Case:
+def run_case(name: str, made: HasRecording, isolate: Isolate = "users", limits: Limits = DEFAULT) -> Case:
     """One pipeline on one recording; what it does wrong is its status, never ours."""
     recording = made.recording
-    try:
-        pipeline = load_pipeline(name)()
-        driven = drive(pipeline, recording.calibration, recording.categories, recording.messages)
-    except Exception as error:  # a user's pipeline may raise anything
-        return failed(name, "pipeline_error", _last_line(error))
+    driven = (
+        _driven_apart(name, recording, limits) if runs_apart(name, isolate) else _driven_here(name, recording)
+    )
+    if isinstance(driven, Case):
+        return driven
     try:
         return scored(name, score_objects(recording, driven.outputs, driven.trajectories), driven)
     except ContractError as error:
+        return failed(name, "pipeline_error", str(error))
+
+
+def _driven_here(name: str, recording: Recording) -> Driven | Case:
+    try:
+        pipeline = load_pipeline(name)()
+        return drive(pipeline, recording.calibration, recording.categories, recording.messages)
+    except Exception as error:  # a pipeline may raise anything
+        return failed(name, "pipeline_error", last_line(error))
+
+
+def _driven_apart(name: str, recording: Recording, limits: Limits) -> Driven | Case:
+    told = (recording.calibration, recording.categories, recording.messages)
+    try:
+        return drive_isolated(name, *told, limits)
+    except TimedOut as error:
+        return failed(name, "timeout", str(error))
+    except Failed as error:
         return failed(name, "pipeline_error", str(error))
 
 
@@ -141,11 +161,6 @@ def _spoiled(case: Case, bad: list[Receipt]) -> Case:
     """A receipt that does not match makes every number of the recording void."""
     names = ", ".join(f"{r.fault} {r.quantity}" for r in bad)
     return failed(case.pipeline, "receipt_mismatch", f"receipt does not match: {names}")
-
-
-def _last_line(error: Exception) -> str:
-    place = traceback.extract_tb(error.__traceback__)[-1]
-    return f"{type(error).__name__}: {error} (line {place.lineno} of {place.name})"
 
 
 class Clock:

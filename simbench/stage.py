@@ -21,7 +21,7 @@ from simbench.case import Job, boxes_of
 from simbench.faults.delivery import Sweep
 from simbench.faults.refit import Refit, refit
 from simbench.faults.trace import trace_shake
-from simbench.plugins import reads_images
+from simbench.isolate.ask import reads_images
 from simbench.recording import Recording
 from simbench.reuse import Kept, world_of
 from simbench.sensors.detector import perfect

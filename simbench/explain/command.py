@@ -20,8 +20,8 @@ from simbench.explain.runs import question_of_run
 from simbench.explain.table import as_csv, as_text
 from simbench.explain.values import Measured
 from simbench.files import prepare_folder, write_text
+from simbench.isolate.ask import check_pipeline_name
 from simbench.outcome import exit_code
-from simbench.plugins import load_pipeline
 from simbench.report.explain_page import sentence, write_page
 from simbench.stage import stage
 from simbench.stress.ledger import Ledger, Outcome
@@ -46,7 +46,7 @@ def run_explain(
     """The exit code: 0 all well, 1 a pipeline failed somewhere, 3 the bench did. Raises BadInput. `seeds`:
     None where none were given: 0-9 of a scenario, all of a run."""
     for name in pipelines:
-        load_pipeline(name)
+        check_pipeline_name(name)
     if Path(target).is_dir():
         if faults or changes or boxes is not None:
             raise BadInput(f"{target} is a run: its faults, scenario and boxes are as they were")

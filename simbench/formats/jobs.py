@@ -14,7 +14,7 @@ from simbench.formats.inject import check_faults
 from simbench.formats.kitti import WORDS, listed, open_kitti
 from simbench.formats.recorded import Player, Recorded, words
 from simbench.formats.scene import SYSTEM
-from simbench.plugins import reads_images
+from simbench.isolate.ask import reads_images
 
 MOST_JOBS = 100_000
 

@@ -22,9 +22,9 @@ from simbench.files import prepare_folder, write_text
 from simbench.frontier.question import Question, margins_of, questions
 from simbench.frontier.requirements import Requirement, as_csv, as_yaml
 from simbench.frontier.search import Goal, Margins, search
+from simbench.isolate.ask import check_pipeline_name
 from simbench.limits import parse_limits
 from simbench.outcome import exit_code
-from simbench.plugins import load_pipeline
 from simbench.report.frontier_page import write_page
 from simbench.report.stress_page import at
 from simbench.stage import stage
@@ -58,7 +58,7 @@ def run_frontier(
     parsed = parse_along(axes)
     deciding, asked = questions(pipelines, parse_limits(limits), goal.functional)
     for name in pipelines:
-        load_pipeline(name)
+        check_pipeline_name(name)
     family = load_scenario(scenario, changes)
     template = Job(
         scenario=scenario, system=system or family.system_names[0], seed=0, pipelines=pipelines,

@@ -16,8 +16,8 @@ from simbench.campaign.executor import check_cluster
 from simbench.campaign.lock import only_one
 from simbench.case import Boxes, Job
 from simbench.files import prepare_folder, write_text
+from simbench.isolate.ask import check_pipeline_name
 from simbench.outcome import exit_code
-from simbench.plugins import load_pipeline
 from simbench.report.stress_page import at, write_page
 from simbench.stage import stage
 from simbench.stress.axes import parse_axes
@@ -50,7 +50,7 @@ def run_stress(
     parsed = parse_axes(axes)
     plan = grid(parsed) if design == "grid" else scattered(parsed, points, cast(Design, design))
     for name in pipelines:
-        load_pipeline(name)
+        check_pipeline_name(name)
     family = load_scenario(scenario, changes)
     template = Job(
         scenario=scenario, system=system or family.system_names[0], seed=0, pipelines=pipelines,
