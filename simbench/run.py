@@ -24,7 +24,7 @@ from simbench.formats.kitti import is_recorded
 from simbench.formats.scene import RecordedScene
 from simbench.isolate.ask import runs_apart
 from simbench.isolate.drive import drive_isolated
-from simbench.isolate.limits import Failed, Isolate, Limits, TimedOut
+from simbench.isolate.limits import DEFAULT, Failed, Isolate, Limits, TimedOut
 from simbench.plugins import last_line, load_pipeline
 from simbench.recording import Recording
 from simbench.score.contract import ContractError
@@ -128,9 +128,8 @@ class HasRecording(Protocol):
 def run_case(name: str, made: HasRecording, isolate: Isolate = "users", limits: Limits = DEFAULT) -> Case:
     """One pipeline on one recording; what it does wrong is its status, never ours."""
     recording = made.recording
-    driven = (
-        _driven_apart(name, recording, limits) if runs_apart(name, isolate) else _driven_here(name, recording)
-    )
+    apart = runs_apart(name, isolate)
+    driven = _driven_apart(name, recording, limits) if apart else _driven_here(name, recording)
     if isinstance(driven, Case):
         return driven
     try:

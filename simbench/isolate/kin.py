@@ -28,9 +28,8 @@ def in_session(session: int) -> list[int]:
 
 def memory_mb(pids: list[int]) -> float:
     """Resident memory of processes together; pages that they share count once for each of them."""
-    return (
-        sum(int(_read(pid, "statm").split()[1] or 0) * _PAGE for pid in pids if _read(pid, "statm")) / 2**20
-    )
+    pages = [words[1] for pid in pids if len(words := _read(pid, "statm").split()) > 1]
+    return sum(map(int, pages)) * _PAGE / 2**20
 
 
 def own_memory_mb(pids: list[int]) -> float:

@@ -5,8 +5,8 @@ The round trip gives equal messages, bit by bit: numbers that may be any float t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import cast
+from collections.abc import Mapping, Sequence
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from fusion.messages import (
     LidarScan,
     Measurement,
 )
-from simbench.isolate.fields import Taken
+from simbench.isolate.fields import Shape, Taken
 from simbench.isolate.frames import Frame, FrameError
 
 PROTOCOL = "simbench-pipeline/1"
@@ -145,24 +145,25 @@ def _boxes(taken: Taken) -> tuple[Detection, ...]:
     )
 
 
-_SCAN = {
+_Specs: TypeAlias = dict[str, tuple[str, Shape]]
+_SCAN: _Specs = {
     "xyz_m": ("f32", ("n", 3)),
     "intensity": ("f32", ("n",)),
     "offset_ns": ("i32", ("n",)),
     "ring": ("i16", ("n",)),
 }
-_IMAGE = {"rgb": ("u8", ("h", "w", 3))}
-_MOTION = {name: ("f64", (3,)) for name in ("velocity_mps", "rate_radps", "specific_force_mps2")}
-_ARRAYS: dict[type, tuple[str, dict]] = {
+_IMAGE: _Specs = {"rgb": ("u8", ("h", "w", 3))}
+_MOTION: _Specs = {name: ("f64", (3,)) for name in ("velocity_mps", "rate_radps", "specific_force_mps2")}
+_ARRAYS: dict[type, tuple[str, _Specs]] = {
     LidarScan: ("lidar_scan", _SCAN),
     CameraImage: ("camera_image", _IMAGE),
     EgoMotion: ("ego_motion", _MOTION),
 }
-_BY_KIND: dict[str, tuple] = {kind: (make, specs) for make, (kind, specs) in _ARRAYS.items()}
+_BY_KIND: dict[str, tuple[Any, _Specs]] = {kind: (make, specs) for make, (kind, specs) in _ARRAYS.items()}
 
 
 def _stacked(
-    rows: list, width: tuple[int, ...], dtype: type[np.float64] | type[np.int64] = np.float64
+    rows: Sequence[Any], width: tuple[int, ...], dtype: type[np.float64] | type[np.int64] = np.float64
 ) -> np.ndarray:
     """Rows of a shape as one array [rows *width], without rows too."""
     return np.array(rows, dtype=dtype).reshape(len(rows), *width)
