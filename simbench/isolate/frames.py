@@ -15,7 +15,7 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, BinaryIO
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -35,6 +35,13 @@ _NAMES = {dtype: name for name, dtype in DTYPES.items()}
 
 class FrameError(ValueError):
     """Bytes that are no frame, or a frame that is not what it must be; the message is one sentence."""
+
+
+@runtime_checkable
+class Readable(Protocol):
+    """A file, a pipe, or bytes in memory."""
+
+    def read(self, size: int, /) -> bytes: ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,7 +111,7 @@ def unpack(header: bytes, body: bytes) -> Frame:
     return Frame(kind=kind, fields=content, arrays=arrays)
 
 
-def read(stream: BinaryIO) -> Frame | None:
+def read(stream: Readable) -> Frame | None:
     """The next frame of a blocking stream; None where it has ended."""
     head = _exactly(stream, HEAD.size)
     if not head:
@@ -118,7 +125,7 @@ def read(stream: BinaryIO) -> Frame | None:
     return unpack(header, body)
 
 
-def _exactly(stream: BinaryIO, size: int) -> bytes:
+def _exactly(stream: Readable, size: int) -> bytes:
     """`size` bytes, fewer only at the end of the stream."""
     found = bytearray()
     while len(found) < size and (more := stream.read(min(size - len(found), 2**20))):
