@@ -68,20 +68,37 @@ def main():
             return
         kind, number = told["kind"], told["id"]
         if kind == "describe":
-            write({"kind": "description", "id": number, "protocol": "simbench-pipeline/1", "reads_images": False})
+            write(
+                {
+                    "kind": "description",
+                    "id": number,
+                    "protocol": "simbench-pipeline/1",
+                    "reads_images": False,
+                }
+            )
         elif kind == "reset":
             seen = {}
             write({"kind": "ready", "id": number})
         elif kind == "finish":
             none = ("i64", [0], [])
-            write({"kind": "trajectories", "id": number}, track_id=none, count=none, stamp_ns=none,
-                  position_ego_m=("f64", [0, 3], []), inlier=("u8", [0], []))
+            write(
+                {"kind": "trajectories", "id": number},
+                track_id=none,
+                count=none,
+                stamp_ns=none,
+                position_ego_m=("f64", [0, 3], []),
+                inlier=("u8", [0], []),
+            )
         elif kind == "lidar_scan":
             fields, found = answer(told, arrays, seen)
             write(fields, **found)
         else:
             if kind == "detections" and told["category"]:
-                seen = {"sensor": told["sensor"], "category": told["category"][0], "track_id": arrays["track_id"][0]}
+                seen = {
+                    "sensor": told["sensor"],
+                    "category": told["category"][0],
+                    "track_id": arrays["track_id"][0],
+                }
             write({"kind": "nothing", "id": number})
 
 

@@ -1,5 +1,5 @@
 """The command line: `simbench demo | run | stress | frontier | explain | calibrate | list | describe |
-timeline | doctor | learn | check`.
+timeline | doctor | learn | check | score`.
 
 Exit codes: 0 good, 1 a pipeline failed, 2 usage or bad input, 3 the bench itself failed (a receipt does not
 match, a crash of ours), 5 nothing selected.
@@ -18,7 +18,8 @@ from click.core import ParameterSource
 from simbench.commands.check import check
 from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
-from simbench.commands.options import DEFAULT, OF_THE_PAPER, cluster_option, seeds_of
+from simbench.commands.options import DEFAULT, OF_THE_PAPER, cluster_option, isolation, seeds_of
+from simbench.commands.score import score
 
 if TYPE_CHECKING:
     from simbench.case import Boxes, Images, Job, JobResult
@@ -180,12 +181,14 @@ def demo(
     "--calibration", default="true", show_default=True, metavar="true|found[:FILE]",
     help="What the pipelines are told: the truth, or what 'simbench calibrate' finds (or wrote to FILE).",
 )  # fmt: skip
+@isolation
 @_common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
     changes: tuple[str, ...], off: tuple[str, ...], alone: bool,
     boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...],
     images: Images, jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
+    apart: dict[str, Any],
 ) -> None:  # fmt: skip
     """Run scenarios (names or .yaml files) through pipelines; write result.json and report.html.
 
@@ -222,7 +225,7 @@ def run(
         given = click.get_current_context().get_parameter_source("seeds") != ParameterSource.DEFAULT
         template = Job(
             scenario="", system=system, seed=0, pipelines=chosen, faults=faults, images=images, size_px=size,
-            boxes=boxes, frames=span,
+            boxes=boxes, frames=span, **apart,
         )  # fmt: skip
         planned += _recorded_jobs(recorded, template, seeds if given else None, alone)
     if len(recorded) < len(dict.fromkeys(targets)):
@@ -241,7 +244,7 @@ def run(
                 job = Job(
                     scenario=target, system=name, seed=seed, pipelines=chosen, faults=faults,
                     images=images, size_px=size, boxes=boxes, changes=changes, calibration=calibration,
-                    found_in=found_in, off=tuple(dict.fromkeys(off)),
+                    found_in=found_in, off=tuple(dict.fromkeys(off)), **apart,
                 )  # fmt: skip
                 # The same drive with errors off: what every loss is measured against.
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
@@ -672,6 +675,7 @@ def learn(seeds: tuple[int, ...], out: Path) -> None:
 main.add_command(check)
 main.add_command(explain)
 main.add_command(frontier)
+main.add_command(score)
 
 
 if __name__ == "__main__":

@@ -30,6 +30,8 @@ def load_pipeline(name: str) -> Factory:
     points = {point.name: point for point in entry_points(group=GROUP)}
     if name in points:
         factory = _imported(name, points[name].load)
+    elif name.startswith("exec:"):
+        raise BadInput(f"pipeline '{name}' is a program, and a Python pipeline is needed here")
     elif ":" in name:
         factory = _from_reference(name)
     else:

@@ -24,6 +24,7 @@ from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
 from simbench.drive import Driven
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
+from simbench.isolate.limits import DEFAULT
 from simbench.score.statistics import summarize
 
 SCHEMA = "simbench-result/1"
@@ -96,6 +97,15 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
         words += ["--calibration", job.calibration]
     if job.size_px is not None:
         words += ["--size", f"{job.size_px[0]}x{job.size_px[1]}"]
+    if job.isolate != "users":
+        words += ["--isolate", job.isolate]
+    for option, given, usual in (
+        ("--message-timeout", job.limits.message_s, DEFAULT.message_s),
+        ("--case-timeout", job.limits.case_s, DEFAULT.case_s),
+        ("--memory", job.limits.memory_mb, DEFAULT.memory_mb),
+    ):
+        if given != usual:
+            words += [option, f"{given:g}" if isinstance(given, float) else str(given)]
     return shlex.join([*words, "--images", job.images])
 
 

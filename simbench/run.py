@@ -19,7 +19,7 @@ from simbench.exhibit import PairView, pair_views
 from simbench.faults.draw import shake_words
 from simbench.faults.proof import receipts
 from simbench.faults.receipt import MISMATCH, Receipt
-from simbench.formats.jobs import play_job
+from simbench.formats.jobs import play_job, player_of
 from simbench.formats.kitti import is_recorded
 from simbench.formats.scene import RecordedScene
 from simbench.isolate.ask import runs_apart
@@ -30,7 +30,7 @@ from simbench.recording import Recording
 from simbench.score.contract import ContractError
 from simbench.score.objects import score_objects, score_oracles
 from simbench.score.pairs import frames_and_pairs
-from simbench.sensors.pictures import TakePicture
+from simbench.sensors.pictures import TakePicture, by_rays
 from simbench.stage import Stage, as_told, pictures, record, stage
 
 
@@ -74,6 +74,21 @@ def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) 
     shake = shake_words(captured.drawn, staged.faults, staged.system.duration_s)
     recording = as_told(job, staged, captured.recording)
     return Made(recording=recording, receipts=found, shake=shake)
+
+
+def recording_of(job: Job) -> tuple[Scenario | RecordedScene, FaultSet, Made]:
+    """What a job records, for whoever runs no pipeline here; with pictures by rays (or the recorded ones)
+    unless `images` is `none`. Raises BadInput."""
+    if is_recorded(job.scenario):
+        played = player_of(job).play(images=job.images != "none")
+        return (
+            played.scene,
+            played.faults,
+            Made(recording=played.recording, receipts=played.receipts, shake=""),
+        )
+    staged = stage(job)
+    picture = None if job.images == "none" else by_rays(staged.rig, job.seed)
+    return staged.scenario, staged.faults, _record(job, staged, picture, Clock())
 
 
 def _guarded(

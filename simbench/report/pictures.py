@@ -25,6 +25,7 @@ from simbench.case import Images, Job
 from simbench.exhibit import PairView
 from simbench.faults.draw import Drawn, draw
 from simbench.formats.kitti import is_recorded
+from simbench.isolate.reference import is_ours
 from simbench.motion import Motion, at
 from simbench.plugins import load_pipeline
 from simbench.report.recorded import RecordedReplay
@@ -212,8 +213,10 @@ class SixSteps(Protocol):
 
 
 def explain_view(replay: Replayed, view: PairView, pipeline: str) -> AoiExplanation | None:
-    """Steps 1 to 4 on the target's delivered box. None without a box, or where the pipeline
-    has not the six steps."""
+    """Steps 1 to 4 on the target's delivered box. None without a box, or where the pipeline has not the six
+    steps, or is a user's: no code of theirs is loaded here."""
+    if not is_ours(pipeline):
+        return None
     steps = load_pipeline(pipeline)()
     if not isinstance(steps, SixSteps) or view.box_px is None:
         return None

@@ -19,7 +19,7 @@ from tests.simbench.support import recorded, staged
 
 def seen(captured: Captured, *names: str) -> tuple[PairView, ...]:
     cheats.handed(captured.recording)
-    cases = [run_case(name, captured) for name in names]
+    cases = [run_case(name, captured, "none") for name in names]
     outputs = {case.pipeline: case.driven.outputs for case in cases if case.driven is not None}
     return pair_views(captured.recording, outputs)
 

@@ -295,5 +295,5 @@ def test_a_crash_of_a_pipeline_stays_its_own(data: Path) -> None:
             return ()
 
     with mock.patch("simbench.run.load_pipeline", lambda name: Wrong):
-        result = run_job(job(data / "object", 3, pipelines=("wrong",)))
+        result = run_job(job(data / "object", 3, pipelines=("wrong",), isolate="none"))
     assert [case.status for case in result.cases] == ["pipeline_error", "ok"]

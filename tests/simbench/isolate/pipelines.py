@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-BASE = '''
+BASE = """
 import ctypes, os, signal, subprocess, sys, time
 import numpy as np
 from fusion.messages import FusionOutput, LidarScan, LocalizedObject, Trajectory
@@ -36,7 +36,7 @@ class Base:
     def trajectories(self):
         return ()
 
-'''
+"""
 
 
 def write(folder: Path, body: str, *, name: str = "mine.py", before: str = "") -> str:
@@ -52,7 +52,7 @@ def program(folder: Path, body: str) -> str:
     return f"exec:python3 {folder / 'program.py'}"
 
 
-PROGRAM = '''
+PROGRAM = """
 import json, os, signal, struct, sys, time
 
 def ask():
@@ -79,4 +79,4 @@ def begin():
     say("description", ask()["id"], protocol="simbench-pipeline/1")
     say("ready", ask()["id"])
 
-'''
+"""

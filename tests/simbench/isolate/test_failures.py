@@ -65,7 +65,7 @@ def failed(case: Case, why: str, status: str = "pipeline_error") -> None:
 
 RAISES = {
     "def __init__(self): raise LookupError('no licence')": "LookupError: no licence (line ",
-    "def reset(self, calibration, categories): raise LookupError('no camera')": "LookupError: no camera (line",
+    "def reset(self, *_): raise LookupError('no camera')": "LookupError: no camera (line",
     "def answer(self, scan): return 1 / 0": "ZeroDivisionError: division by zero (line",
     "def trajectories(self): raise RuntimeError('two\\nlines')": "RuntimeError: two lines (line",
     "def answer(self, scan): sys.exit(3)": "SystemExit: 3 (line",
@@ -98,7 +98,7 @@ ANSWERS = {
     "return self.found(scan, stamp_ns=0)": "lies outside its sweep",
     "return FusionOutput(scan_sensor='nowhere', scan_seq=0, objects=())": "which was never delivered",
     "return FusionOutput(scan_sensor=scan.sensor, scan_seq=0, objects=())": "a second output",
-    "return FusionOutput(scan_sensor=scan.sensor, scan_seq=0, objects=(3,))": "must be LocalizedObject, not int",
+    "return FusionOutput(scan_sensor='a', scan_seq=0, objects=(3,))": "must be LocalizedObject, not int",
 }
 
 
@@ -110,9 +110,9 @@ def test_what_it_may_not_answer_is_said(captured: Captured, tmp_path: Path, body
 
 
 def test_malformed_trajectories_are_said(captured: Captured, tmp_path: Path) -> None:
-    track = "Trajectory(track_id=1, stamp_ns=np.arange(2), position_ego_m=np.zeros(({n}, 3)), inlier=np.ones({m}, bool))"
     for n, m in ((3, 2), (2, 3)):
-        body = "def trajectories(self): return (" + track.format(n=n, m=m) + ",)"
+        parts = f"stamp_ns=np.arange(2), position_ego_m=np.zeros(({n}, 3)), inlier=np.ones({m}, bool)"
+        body = f"def trajectories(self): return (Trajectory(track_id=1, {parts}),)"
         failed(run_case(write(tmp_path, body), captured, limits=SHORT), "trajectory 1: stamps, positions and")
     failed(
         run_case(write(tmp_path, "def trajectories(self): return ('x',)"), captured, limits=SHORT),
@@ -150,9 +150,7 @@ def test_how_its_process_ended_is_said(captured: Captured, tmp_path: Path, body:
 def test_a_message_is_named_by_its_place_kind_and_sensor(captured: Captured, tmp_path: Path) -> None:
     body = "def answer(self, scan):\n    if scan.seq == 2: os._exit(0)"
     messages = captured.recording.messages
-    at, scan = next(
-        (i, m) for i, m in enumerate(messages) if type(m).__name__ == "LidarScan" and m.seq == 2
-    )
+    at, scan = next((i, m) for i, m in enumerate(messages) if type(m).__name__ == "LidarScan" and m.seq == 2)
     case = run_case(write(tmp_path, body), captured, limits=SHORT)
     failed(case, f"message {at} (LidarScan 2 of '{scan.sensor}')")
 
@@ -195,7 +193,7 @@ def test_slow_is_fine_below_the_limit(captured: Captured, tmp_path: Path) -> Non
 
 
 GROWS = {
-    "in steps": "while True:\n        self.kept = getattr(self, 'kept', []) + [np.ones(10**6)]; time.sleep(0.005)",
+    "in steps": "kept = []\n    while True: kept.append(np.ones(10**6)); time.sleep(0.005)",
     "at once": "np.ones(10**10)",
     "in a child": (
         "subprocess.run([sys.executable, '-c', 'import time; x = bytearray(600 * 2**20); time.sleep(60)'])"
@@ -251,7 +249,8 @@ def test_a_process_left_behind_by_a_good_run_is_ended(captured: Captured, tmp_pa
 
 
 def test_a_thread_left_behind_by_a_good_run_is_ended(captured: Captured, tmp_path: Path) -> None:
-    body = "def trajectories(self):\n    import threading; threading.Thread(target=time.sleep, args=(60,)).start()\n    return ()"
+    thread = "import threading; threading.Thread(target=time.sleep, args=(60,)).start()"
+    body = f"def trajectories(self):\n    {thread}\n    return ()"
     assert run_case(write(tmp_path, body), captured, limits=SHORT).status == "ok"
 
 
@@ -262,7 +261,7 @@ PROGRAMS = {
     "begin(); ask(); raw(b'SBF1' + b'\\xff' * 8)": "is no frame: a header of 4294967295 bytes is too long",
     "begin(); ask(); raw(struct.pack('<4sII', b'SBF1', 2, 2**31) + b'{}')": "a body of 2147483648 bytes",
     "begin(); ask(); raw(struct.pack('<4sII', b'SBF1', 3, 0) + b'{x}')": "a frame's header is no JSON",
-    "begin(); ask(); raw(struct.pack('<4sII', b'SBF1', 3000, 0) + b'[' * 3000)": "a frame's header is no JSON",
+    "begin(); ask(); raw(struct.pack('<4sII', b'SBF1', 3000, 0) + b'[' * 3000)": "header is no JSON",
     "begin(); n = ask()['id']; raw(frame('nothing', n) * 2); ask()": "wrote more than one answer",
     "begin(); n = ask()['id']; say('nothing', n); ask(); say('nothing', n)": "has not the id of the question",
     "begin(); say('ready', ask()['id'])": "is a 'ready', not nothing or output",

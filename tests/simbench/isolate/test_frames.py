@@ -29,7 +29,17 @@ from fusion.messages import (
     Trajectory,
 )
 from simbench.isolate.answers import output_frame, read_output, read_trajectories, trajectories_frame
-from simbench.isolate.frames import HEAD, LONGEST_BODY, Frame, FrameError, check_sizes, pack, read, sizes, unpack
+from simbench.isolate.frames import (
+    HEAD,
+    LONGEST_BODY,
+    Frame,
+    FrameError,
+    check_sizes,
+    pack,
+    read,
+    sizes,
+    unpack,
+)
 from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
 from tests.simbench.support import digest
 
@@ -90,7 +100,9 @@ LENSES = st.builds(
 SIZES = st.builds(CategorySize, mean_m=st.tuples(*[FLOATS] * 3), spread=FLOATS)
 
 
-@given(st.dictionaries(WORDS, st.tuples(POSES, st.none() | LENSES), max_size=4), st.dictionaries(WORDS, SIZES))
+@given(
+    st.dictionaries(WORDS, st.tuples(POSES, st.none() | LENSES), max_size=4), st.dictionaries(WORDS, SIZES)
+)
 def test_calibration_and_categories_come_back_in_their_order(
     sensors: Mapping[str, tuple[Transform, PinholeCamera | None]], sizes: Mapping[str, CategorySize]
 ) -> None:
@@ -120,8 +132,8 @@ def test_every_output_comes_back_bit_by_bit(output: FusionOutput) -> None:
 def tracks(draw: st.DrawFn) -> Trajectory:
     n = draw(st.integers(0, 4))
     return Trajectory(
-        track_id=draw(INT64), stamp_ns=draw(arrays(np.int64, n)), position_ego_m=draw(arrays(np.float64, n, 3)),
-        inlier=draw(arrays(bool, n)),
+        track_id=draw(INT64), stamp_ns=draw(arrays(np.int64, n)),
+        position_ego_m=draw(arrays(np.float64, n, 3)), inlier=draw(arrays(bool, n)),
     )  # fmt: skip
 
 
@@ -292,7 +304,8 @@ def test_a_calibration_that_is_none_is_one_sentence() -> None:
         ("not orthonormal", {}, {"rotation": np.full((1, 3, 3), math.nan)}),
         ("its protocol is 'x', not simbench-pipeline/1", {"protocol": "x"}, {}),
         ("has intrinsics but no T_ego_sensor", {"cameras": ["a"]}, {
-            "intrinsics_px": np.ones((1, 4)), "size_px": np.ones((1, 2), np.int64), "distortion": np.ones((1, 5))
+            "intrinsics_px": np.ones((1, 4)), "distortion": np.ones((1, 5)),
+            "size_px": np.ones((1, 2), np.int64),
         }),
     ):  # fmt: skip
         with pytest.raises(FrameError, match=sentence):

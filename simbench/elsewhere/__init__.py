@@ -1,0 +1,1 @@
+"""Pipelines that are run elsewhere: the messages of a recording as a file, and the results that come back."""
