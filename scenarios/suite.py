@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 
 from scenarios.errors import BadInput, Where, show
 from scenarios.library import find, names, shown, user_file
-from scenarios.scenario import Name, Positive, Spec, broken
+from scenarios.scenario import Name, Positive, Share, Spec, broken
 from scenarios.seeding import seed_list
 from scenarios.validate import validate
 from scenarios.yaml_source import read_yaml
@@ -31,18 +31,20 @@ class Block(Spec):
 
     faults: each entry is what `--faults` takes, or a list of those, on top of the scenario's own; `own` is
     just these, `none` clears them. change: values of the scenario file, as `--set` takes them. seeds,
-    pipelines: in place of the suite's; limits, margins: besides the suite's.
+    pipelines: in place of the suite's; limits, margins: besides the suite's. failed_runs: the share of runs
+    that may have a gross failure (off by more than 1 m, or no position).
     """
 
     scenarios: tuple[Word, ...] = Field(min_length=1)
     systems: tuple[Literal["car", "wearable"], ...] = Field(default=("car",), min_length=1)
     faults: tuple[Word | tuple[Word, ...], ...] = Field(default=("none",), min_length=1)
     change: tuple[Word, ...] = ()
-    seeds: str | None = None
+    seeds: str | int | None = None
     pipelines: tuple[Word, ...] | None = Field(default=None, min_length=1)
     tags: tuple[Name, ...] = ()
     limits: Limits = Field(default_factory=dict)
     margins: Margins = Field(default_factory=dict)
+    failed_runs: Share | None = None
     images: Literal["none", "raycast"] = "none"
     boxes: Literal["labels", "model"] | None = None
 
@@ -64,7 +66,7 @@ class Suite(Spec):
 
     name: Name
     description: Word
-    seeds: str = "0-19"
+    seeds: str | int = "0-19"
     pipelines: tuple[Word, ...] = Field(default=("robust",), min_length=1)
     metrics: tuple[Word, ...] = Field(
         default=("precision", "recall", "coverage.smooth", "mae_m"), min_length=1
@@ -72,6 +74,7 @@ class Suite(Spec):
     margin: Positive = 0.05
     margins: Margins = Field(default_factory=dict)
     limits: Limits = Field(default_factory=dict)
+    failed_runs: Share | None = None
     canary: Word = "timing.clock_offset_ms=50"
     blocks: Mapping[Name, Block] = Field(min_length=1)
 
@@ -115,10 +118,10 @@ def load_suite(name_or_path: str) -> SuiteFile:
     return SuiteFile(suite=validate(Suite, document.data, document.where), where=document.where, path=path)
 
 
-def _check_seeds(text: str | None) -> None:
+def _check_seeds(text: str | int | None) -> None:
     if text is not None:
         try:
-            seed_list(text)
+            seed_list(str(text))
         except ValueError as error:
             raise broken(str(error), "seeds") from None
 

@@ -27,7 +27,12 @@ class Limit:
     @property
     def text(self) -> str:
         """As it is written, with the metric's full name."""
-        return f"{self.metric.name}{'>=' if self.metric.better == 'higher' else '<='}{self.value:g}"
+        return self.metric.name + self.text_of_value
+
+    @property
+    def text_of_value(self) -> str:
+        """As it is written after the metric's name."""
+        return f"{'>=' if self.metric.better == 'higher' else '<='}{self.value:g}"
 
     def margin(self, value: float | None) -> float:
         """By how much a value keeps the limit; below 0 it does not.

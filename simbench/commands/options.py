@@ -1,9 +1,10 @@
-"""What several verbs share: which pipelines run where none is named, and lists of seeds."""
+"""What several verbs share: which pipelines run where none is named, and options."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 from typing import Any
 
 import click
@@ -56,3 +57,85 @@ def isolation(command: Callable[..., None]) -> Callable[..., None]:
         command(*args, apart={"isolate": isolate, "limits": limits}, **more)
 
     return with_them
+
+
+def size_of(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
+    """The size that a word like 960x600 names. BadParameter: anything else."""
+    if text is None:
+        return None
+    width, cross, height = text.partition("x")
+    if not cross or not (width + height).isascii() or not width.isdigit() or not height.isdigit():
+        raise click.BadParameter(f"'{text}' is not an image size; allowed: 960x600")
+    if not (64 <= int(width) <= 2048 and 64 <= int(height) <= 2048):
+        raise click.BadParameter(f"'{text}' is out of range; allowed: 64x64 to 2048x2048")
+    return int(width), int(height)
+
+
+def common(folder: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """The options that `demo` and `run` share; `folder`: where results go unless told."""
+    options = (
+        click.option("--seeds", default="0-1", callback=seeds_of, help="Runs to make: 0-3 or 0,2,5."),
+        click.option(
+            "--images",
+            type=click.Choice(["none", "raycast", "gl"]),
+            default="raycast",
+            show_default=True,
+            help="Take pictures by rays, by OpenGL, or not at all.",
+        ),
+        click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores)."),
+        click.option(
+            "--out",
+            type=click.Path(path_type=Path),
+            default=Path(folder),
+            show_default=True,
+            help="Folder for result.json, report.html and the video.",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print result.json on stdout."),
+        click.option("--size", callback=size_of, default=None, help="Image size in pixels, e.g. 960x600."),
+    )
+
+    def add(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return add
+
+
+OF_SUITES = (
+    "words", "tags", "last_failed", "resume", "against", "allow_changed", "until_decided", "cluster",
+)  # fmt: skip
+
+
+def of_suites(command: Callable[..., None]) -> Callable[..., None]:
+    """The options of `run` that are for suites; the command gets `suite`: those that were given, by name."""
+    path = click.Path(path_type=Path)
+    options = (
+        click.option("-k", "words", default=None, metavar="EXPR", help="Suites: only cases whose id has it."),
+        click.option("-m", "tags", default=None, metavar="TAG", help="Suites: only blocks with this tag."),
+        click.option("--lf", "last_failed", is_flag=True, help="Suites: only what did not pass last time."),
+        click.option("--resume", is_flag=True, help="Suites: go on where a run in --out was stopped."),
+        click.option("--against", type=path, default=None, metavar="FILE", help="Suites: a baseline."),
+        click.option("--allow-changed", is_flag=True, help="Suites: compare though the bench changed."),
+        click.option("--until-decided", is_flag=True, help="Suites: 20, 40 or 80 runs, as verdicts need."),
+        cluster_option,
+    )
+
+    @wraps(command)
+    def with_them(*args: Any, **more: Any) -> None:
+        names = (
+            "words",
+            "tags",
+            "last_failed",
+            "resume",
+            "against",
+            "allow_changed",
+            "until_decided",
+            "cluster",
+        )
+        command(*args, suite={name: more.pop(name) for name in names}, **more)
+
+    wrapped: Callable[..., None] = with_them
+    for option in reversed(options):
+        wrapped = option(wrapped)
+    return wrapped

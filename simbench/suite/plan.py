@@ -24,7 +24,8 @@ from simbench.score.metrics import Metric
 @dataclass(frozen=True, kw_only=True)
 class Group:
     """Cases that differ by their seed only. job: of its first seed, with its one pipeline. metrics: those
-    that a baseline is asked about, each with the margin by which it may be worse."""
+    that a baseline is asked about, each with the margin by which it may be worse. failed_runs: the share of
+    runs that may have a gross failure."""
 
     block: str
     faults: str
@@ -33,6 +34,7 @@ class Group:
     tags: tuple[str, ...]
     limits: tuple[Limit, ...]
     metrics: tuple[tuple[Metric, float], ...]
+    failed_runs: float | None
 
     @property
     def scenario(self) -> str:
@@ -46,7 +48,8 @@ class Group:
     @property
     def name(self) -> str:
         """block/scenario/system/faults/pipeline"""
-        return "/".join((self.block, self.scenario, self.job.system, self.faults, self.pipeline))
+        pipeline = PurePath(self.pipeline).name  # of a file without its folder, which differs between users
+        return "/".join((self.block, self.scenario, self.job.system, self.faults, pipeline))
 
     def case(self, seed: int) -> str:
         """The id of a case."""
@@ -65,10 +68,10 @@ class Group:
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """One job of a suite, and which cases it makes: pipeline to group."""
+    """One job of a suite. groups: the name of the group that each of its pipelines' cases belongs to."""
 
     job: Job
-    groups: Mapping[str, str]
+    groups: tuple[str, ...]
 
 
 def groups_of(
@@ -90,13 +93,15 @@ def groups_of(
         margins = _margins(suite.margins, where.at("margins"), metrics) | _margins(
             block.margins, place.at("margins"), metrics
         )
-        runs = tuple(seeds) if seeds is not None else seed_list(block.seeds or suite.seeds)
+        runs = tuple(seeds) if seeds is not None else seed_list(str(suite.seeds if block.seeds is None else block.seeds))
         for job, faults in _jobs(file, block, place):
-            for pipeline in pipelines or block.pipelines or suite.pipelines:
+            own = tuple(_pipeline(file, word) for word in block.pipelines or suite.pipelines)
+            for pipeline in pipelines or own:
                 group = Group(
                     block=name, faults=faults, seeds=runs, tags=block.tags, limits=tuple(limits.values()),
                     job=replace(job, seed=runs[0], pipelines=(pipeline,)),
                     metrics=tuple((m, margins.get(m.name, suite.margin)) for m in metrics.values()),
+                    failed_runs=suite.failed_runs if block.failed_runs is None else block.failed_runs,
                 )  # fmt: skip
                 if group.name in found:
                     raise place.error(f"two groups are called {group.name}")
@@ -111,7 +116,7 @@ def recordings_of(cases: Sequence[tuple[Group, int]]) -> tuple[Recording, ...]:
         drive = replace(group.at(seed), pipelines=())
         drives.setdefault(drive, {})[group.pipeline] = group.name
     return tuple(
-        Recording(job=replace(drive, pipelines=tuple(groups)), groups=groups)
+        Recording(job=replace(drive, pipelines=tuple(groups)), groups=tuple(groups.values()))
         for drive, groups in drives.items()
     )
 
@@ -147,6 +152,12 @@ def _beside(file: SuiteFile, scenario: str) -> str:
     if "/" not in scenario and not scenario.endswith((".yaml", ".yml")):
         return scenario
     return str(file.path.parent / scenario)
+
+
+def _pipeline(file: SuiteFile, reference: str) -> str:
+    """A pipeline's file lies beside the suite file too."""
+    path, colon, attribute = reference.rpartition(":")
+    return f"{file.path.parent / path}{colon}{attribute}" if path.endswith(".py") else reference
 
 
 def _placed(error: BadInput, where: Where) -> BadInput:

@@ -28,6 +28,7 @@ from simbench.campaign.key import task_key
 from simbench.campaign.ledger import Done, Ledger
 from simbench.campaign.run import campaign
 from simbench.case import Job
+from simbench.stress.axes import Point
 from simbench.stress.ledger import Task, key_of
 from simbench.stress.run import row_of
 
@@ -109,14 +110,20 @@ def rival(count: int, workers: int) -> Cost:
         return counted(f"ProcessPoolExecutor, {workers} workers", count, pool.map(tiny, range(count)), None)
 
 
+def point(offset: int) -> Point:
+    """One offset."""
+    return (float(offset),)
+
+
 def real(count: int, workers: int) -> Cost:
     """Recordings, scored."""
     tasks: list[Task] = [
         (
-            (float(offset),),
+            point(offset),
             Job(
                 scenario="overtake-approach", system="car", seed=seed,
-                faults=(f"timing.trigger_offset_ms={offset}",), pipelines=("static_projection", "probabilistic"),
+                faults=(f"timing.trigger_offset_ms={offset}",),
+                pipelines=("static_projection", "probabilistic"),
             ),
         )
         for seed in range(count)

@@ -2,8 +2,9 @@
 
     python3 dev.py run python tests/benchmarks/isolate.py [--pipeline NAME] [--repeats 5]
 
-Of a recording of overtake-approach, car, seed 0, without and with images: seconds to start a host, to start it
-and load the pipeline, of a whole case apart and in here (medians of cases that take turns), and their ratio.
+Of a recording of overtake-approach, car, seed 0, without and with images: seconds to start a host, to start
+it and load the pipeline, of a whole case apart and in here (medians of cases that take turns), and their
+ratio.
 `per message` is what is left of the difference after the start, by message: packing, pipes and waking up.
 """
 
@@ -62,8 +63,8 @@ def main() -> None:
         here_s, apart_s = median(here), median(apart)
         each_ms = 1e3 * (apart_s - here_s - start_s) / len(recording.messages)
         print(
-            f"images {images}: {len(recording.messages)} messages, here {here_s:.2f} s, apart {apart_s:.2f} s, "
-            f"ratio {apart_s / here_s:.2f}, per message {each_ms:.2f} ms"
+            f"images {images}: {len(recording.messages)} messages, here {here_s:.2f} s, "
+            f"apart {apart_s:.2f} s, ratio {apart_s / here_s:.2f}, per message {each_ms:.2f} ms"
         )
 
 

@@ -25,7 +25,9 @@ from simbench.case import Job
 from simbench.cli import main
 from simbench.learn import resize
 from simbench.stage import Stage, stage
+from simbench.suite.side import write_side
 from tests.simbench.cheats import named
+from tests.simbench.suite.sides import runs, side
 from tests.simbench.support import staged, write_scenario
 
 VERBS = sorted(main.commands)
@@ -98,8 +100,16 @@ def option_names(command: click.Command) -> set[str]:
 
 
 @pytest.mark.parametrize("verb", VERBS)
-def test_every_verb_has_an_example_that_runs(short: None, tmp_path: Path, verb: str) -> None:
+def test_every_verb_has_an_example_that_runs(
+    short: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, verb: str
+) -> None:
     words = example(verb)
+    if verb in ("baseline", "compare", "plan", "init"):  # these work in the user's folder
+        monkeypatch.chdir(tmp_path)
+        of_smoke = {"clean/overtake-approach/car/none/robust": runs([0.9, 0.8, 0.85])}
+        (tmp_path / "out" / "run").mkdir(parents=True)
+        for name in ("out/run/values.json", "baseline.json"):
+            write_side(side(of_smoke, suite="smoke"), tmp_path / name, commands=True)
     assert words[0] == verb
     small = {"--seeds": "0", "--images": "none", "--jobs": "1", "--out": str(tmp_path / "out")}
     if verb == "learn":
@@ -261,7 +271,7 @@ def test_other_verbs_refuse_bad_words_too(empty_folder: Path, words: tuple[str, 
 
 
 def test_nothing_selected_has_a_code_of_its_own(empty_folder: Path) -> None:
-    done = run("run")
+    done = run("run", "smoke", "-k", "nothing-like-it")
     assert done.exit_code == 5
     assert len(done.stderr.splitlines()) == 1 and "nothing selected" in done.stderr
     assert list(empty_folder.iterdir()) == []
@@ -336,7 +346,7 @@ def test_the_exit_code_is_that_of_the_worst_case(
 def test_a_run_compares_the_paper_with_ours_and_the_demo_stays_with_the_paper() -> None:
     planned: list[Job] = []
     papers = ("static_projection", "static_projection_ground", "probabilistic")
-    with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+    with mock.patch("simbench.commands.run.execute", lambda jobs, *_: planned.extend(jobs)):
         assert run("run", "overtake-recede", "--seeds", "0").exit_code == 0
         assert {job.pipelines for job in planned} == {(*papers, "robust")}
         planned.clear()
@@ -348,6 +358,6 @@ def test_a_scenario_may_be_named_twice_without_counting_twice(short: None, tmp_p
     scenario = load_scenario("overtake-recede").resolve(0)
     path = str(write_scenario(tmp_path, scenario))
     planned: list[Job] = []
-    with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+    with mock.patch("simbench.commands.run.execute", lambda jobs, *_: planned.extend(jobs)):
         assert run("run", path, path, "--system", "car", "--seeds", "0,0", *NONE).exit_code == 0
     assert len(planned) == 1

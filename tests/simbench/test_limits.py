@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from scenarios.errors import BadInput
 from simbench.frontier.command import parse_along
-from simbench.limits import parse_limits
 from simbench.frontier.question import margins_of, questions
+from simbench.limits import parse_limits
 from simbench.stress.ledger import Outcome
 
 

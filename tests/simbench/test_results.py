@@ -168,7 +168,7 @@ def test_the_command_of_a_case_makes_the_same_job(content: dict[str, list[dict[s
     from simbench.cli import main
 
     planned: list[Job] = []
-    with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+    with mock.patch("simbench.commands.run.execute", lambda jobs, *_: planned.extend(jobs)):
         for case in content["cases"]:
             done = CliRunner().invoke(main, words(str(case["command"])))
             assert done.exit_code == 0, done.output

@@ -247,7 +247,7 @@ def test_the_command_of_a_case_makes_the_same_job(data: Path, tmp_path: Path) ->
     for case in content["cases"]:
         program, *again = shlex.split(case["command"])
         assert program == "simbench"
-        with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+        with mock.patch("simbench.commands.run.execute", lambda jobs, *_: planned.extend(jobs)):
             assert CliRunner().invoke(main, again).exit_code == 0
     assert len(set(planned)) == 1
     assert planned[0] == Job(
@@ -258,7 +258,7 @@ def test_the_command_of_a_case_makes_the_same_job(data: Path, tmp_path: Path) ->
 
 def test_seeds_pick_frames_of_the_object_layout(data: Path) -> None:
     planned: list[Job] = []
-    with mock.patch("simbench.cli._execute", lambda jobs, *_: planned.extend(jobs)):
+    with mock.patch("simbench.commands.run.execute", lambda jobs, *_: planned.extend(jobs)):
         assert run(f"kitti:{data / 'object'}").exit_code == 0
         assert [j.seed for j in planned] == [3, 8, 9]
         planned.clear()

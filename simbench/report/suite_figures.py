@@ -1,0 +1,85 @@
+"""Figures of a suite's page: differences with intervals against the margin, and runs old against new."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from markupsafe import Markup
+
+from simbench.report import palette
+from simbench.report.figures import as_svg, grid
+from simbench.suite.gate import Gate
+from simbench.suite.side import Side
+
+LOOK = {
+    "PASS": (palette.RIGHT, "o"),
+    "INCONCLUSIVE": (palette.MUTED, "s"),
+    "FAIL": (palette.WRONG, "X"),
+    "REGRESSION": (palette.WRONG, "X"),
+    "ERROR": (palette.INK, "D"),
+}
+MOST_MARGINS = 6.0  # what lies farther out is drawn at the edge
+
+
+def forest(gates: Sequence[Gate]) -> Markup:
+    """Differences new - old in margins, more is better: 0 is the baseline, -1 what may be lost."""
+    shown = [gate for gate in gates if gate.difference is not None and gate.margin]
+
+    def draw(figure: Any) -> None:
+        plot = figure.subplots()
+        for i, gate in enumerate(shown):
+            assert gate.difference is not None and gate.margin
+            colour, mark = LOOK[gate.outcome]
+            centre = _within(gate.difference / gate.margin)
+            if gate.low is not None and gate.high is not None:
+                ends = [_within(gate.low / gate.margin), _within(gate.high / gate.margin)]
+                plot.plot(ends, [-i, -i], color=colour, lw=2.0, solid_capstyle="round")
+            plot.plot([centre], [-i], mark, color=colour, ms=6)
+        plot.axvline(0.0, color=palette.INK, lw=0.9)
+        plot.axvline(-1.0, color=palette.WRONG, lw=1.2, ls="--")
+        plot.set_yticks([-i for i in range(len(shown))], [f"{g.metric}   {g.group}" for g in shown])
+        plot.set_ylim(-len(shown) + 0.4, 0.6)
+        plot.set_xlim(-MOST_MARGINS - 0.2, MOST_MARGINS + 0.2)
+        plot.set_xlabel("new - old in margins, to the right is better; dashed: what may be lost")
+        grid(plot, "x")
+
+    return as_svg(980, 70 + 22 * len(shown), "Differences between new and old with their intervals", draw)
+
+
+def _within(value: float) -> float:
+    return max(-MOST_MARGINS, min(MOST_MARGINS, value))
+
+
+def old_and_new(gates: Sequence[Gate], old: Side | None, new: Side) -> Markup:
+    """Every run of some groups: its value old, joined by a line to its value new."""
+
+    def draw(figure: Any) -> None:
+        plots = figure.subplots(1, len(gates), squeeze=False)[0]
+        for plot, gate in zip(plots, gates, strict=True):
+            earlier = old.groups.get(gate.group) if old is not None else None
+            for seed, run in new.groups[gate.group].runs.items():
+                after = run.values.get(gate.metric)
+                then = earlier.runs.get(seed) if earlier is not None else None
+                before = then.values.get(gate.metric) if then is not None else None
+                if before is not None and after is not None:
+                    plot.plot([0, 1], [before, after], color=palette.RULE, lw=0.9, zorder=1)
+                for x, value, colour in ((0, before, palette.MUTED), (1, after, palette.METHOD)):
+                    if value is not None:
+                        plot.plot([x], [value], "o", color=colour, ms=4, alpha=0.8, zorder=2)
+            if gate.limit is not None:
+                plot.axhline(gate.limit, color=palette.WRONG, lw=1.2, ls="--")
+            for x, mean in ((0, gate.old), (1, gate.new)):
+                if mean is not None:
+                    plot.plot([x - 0.22, x + 0.22], [mean, mean], color=palette.INK, lw=2.0, zorder=3)
+            plot.set(xlim=(-0.5, 1.5), title=_title(gate))
+            plot.set_xticks([0, 1], ["old", "new"])
+            plot.title.set_fontsize(8)
+            grid(plot)
+
+    return as_svg(240.0 * len(gates), 250, "Runs of the worst gates, old and new", draw)
+
+
+def _title(gate: Gate) -> str:
+    block, scenario, *rest = gate.group.split("/")
+    return "\n".join((f"{gate.metric} {gate.outcome}", f"{block}/{scenario}", "/".join(rest)[:44]))

@@ -1,0 +1,233 @@
+"""`simbench run SUITE`: check everything before anything runs, run, judge, write."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from shlex import join
+from typing import Any
+
+import click
+
+from scenarios.errors import BadInput
+from scenarios.fault_set import FaultSet, fault_set, parse_fault_arguments
+from scenarios.suite import Suite, SuiteFile, load_suite
+from simbench.campaign.executor import check_cluster, open_executor
+from simbench.campaign.job_key import job_key
+from simbench.campaign.ledger import NAME as LEDGER
+from simbench.campaign.ledger import Done, Ledger
+from simbench.campaign.lock import only_one
+from simbench.campaign.run import campaign
+from simbench.canary import canary
+from simbench.environment import environment
+from simbench.files import prepare_folder
+from simbench.isolate.ask import check_pipeline_name
+from simbench.isolate.limits import DEFAULT, Isolate, Limits
+from simbench.results import assembled
+from simbench.stage import stage
+from simbench.suite.coverage import coverage
+from simbench.suite.gate import as_lines
+from simbench.suite.judge import Asked, answer
+from simbench.suite.looks import until_decided
+from simbench.suite.plan import Group, Recording, groups_of, recordings_of
+from simbench.suite.run import Record, failed_text, in_order, made_of, record_text
+from simbench.suite.select import chosen
+from simbench.suite.side import Side, read_side, side_of
+from simbench.suite.write import Told, failed_cases, write_answer, write_result, write_values
+
+NOTHING = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Request:
+    """What `simbench run SUITE` was asked. pipelines, seeds: in place of the suite's. words, tags: -k, -m."""
+
+    target: str
+    out: Path
+    pipelines: tuple[str, ...] = ()
+    seeds: tuple[int, ...] | None = None
+    words: str | None = None
+    tags: str | None = None
+    last_failed: bool = False
+    resume: bool = False
+    against: Path | None = None
+    allow_changed: bool = False
+    until_decided: bool = False
+    workers: int | None = None
+    cluster: str | None = None
+    as_json: bool = False
+    isolate: Isolate = "users"
+    limits: Limits = DEFAULT
+
+
+def run_suite(asked: Request) -> int:
+    """The exit code: 0 pass, 1 regression, failed limit or failed pipeline, 3 the bench, 4 inconclusive, 5
+    nothing selected. Raises BadInput before anything runs."""
+    file = load_suite(asked.target)
+    groups = tuple(
+        replace(group, job=replace(group.job, isolate=asked.isolate, limits=asked.limits))
+        for group in groups_of(file, pipelines=asked.pipelines, seeds=asked.seeds)
+    )
+    left_out = canary_of(file)
+    for name in dict.fromkeys(group.pipeline for group in groups):
+        check_pipeline_name(name)
+    check_cluster(asked.cluster)
+    old = None if asked.against is None else read_side(asked.against)
+    if old is not None and old.suite != file.suite.name:
+        raise BadInput(
+            f"is a baseline of the suite '{old.suite}', not of '{file.suite.name}'", file=str(asked.against)
+        )
+    if asked.until_decided and old is None:
+        raise BadInput("--until-decided needs a baseline to decide against: --against FILE")
+    only = failed_cases(asked.out) if asked.last_failed else None
+    cases = chosen(groups, words=asked.words, tags=asked.tags, only=only)
+    if not cases:
+        click.echo(
+            f"simbench: nothing selected: no case of {file.suite.name} is meant{_why(asked)}", err=True
+        )
+        return NOTHING
+    for group in {group.name: group for group, _ in cases}.values():
+        stage(group.job)  # a bad combination costs one sentence and no time
+    prepare_folder(asked.out)
+    with only_one(asked.out):
+        if not asked.resume:
+            for suffix in ("", "-wal", "-shm"):
+                (asked.out / (LEDGER + suffix)).unlink(missing_ok=True)
+        with Ledger(asked.out, {"suite": file.suite.name}, kind="suite") as ledger:
+            run = _Run(suite=file.suite, asked=asked, ledger=ledger, groups=groups)
+            whole = len(cases) == sum(len(group.seeds) for group in groups)
+            return run.finish(cases, old, whole, canary(left_out))
+
+
+def canary_of(file: SuiteFile) -> FaultSet:
+    """The error that the suite's canary asks for and does not get. BadInput: there is none."""
+    change = parse_fault_arguments((file.suite.canary,))
+    found = fault_set({spec.name: spec for spec in change.specs}, "canary")
+    if not found.specs:
+        raise file.where.error("is no error that could be left out", ("canary",))
+    return found
+
+
+def _why(asked: Request) -> str:
+    words = [f"-k {asked.words}" if asked.words else "", f"-m {asked.tags}" if asked.tags else ""]
+    words += ["--lf: nothing failed last time" if asked.last_failed else ""]
+    told = ", ".join(word for word in words if word)
+    return f" by {told}" if told else ""
+
+
+@dataclass(kw_only=True)
+class _Run:
+    """The state of a run: which recordings were made so far."""
+
+    suite: Suite
+    asked: Request
+    ledger: Ledger
+    groups: Sequence[Group]
+    records: dict[Recording, Record] = field(default_factory=dict)
+    fresh: int = 0
+    wall_s: float = 0.0
+
+    def finish(
+        self, cases: Sequence[tuple[Group, int]], old: Side | None, whole: bool, blind: str | None
+    ) -> int:
+        """Run, judge, write, print; the exit code."""
+        asked, look, settled = self.asked, None, None
+        if asked.until_decided and old is not None:
+            names = {group.name for group, _ in cases}
+            going = [group for group in self.groups if group.name in names]
+            new, settled, look = until_decided(going, old, lambda more: self.measure(more, whole))
+        else:
+            new = self.measure(cases, whole)
+        found = answer(
+            new, old, Asked(changed=asked.allow_changed, look=look), canary=blind, settled=settled
+        )  # fmt: skip
+        content = assembled(list(self.records.values()), environment("none"))
+        told = Told(
+            description=self.suite.description, command=join(["simbench", *sys.argv[1:]]), cost=self.cost(),
+            against=None if asked.against is None else asked.against.name,
+            coverage=coverage(self.groups), seconds=_seconds(new, content["timings"]),
+        )  # fmt: skip
+        write_values(new, asked.out)
+        whole_content = write_result(content, found, asked.out)
+        page = write_answer(found, new, old, asked.out, told)
+        if asked.as_json:
+            click.echo(json.dumps(whole_content, indent=1, allow_nan=False))
+        else:
+            for line in (*as_lines(found.gates), *found.notes, *found.problems[1:], found.sentence):
+                click.echo(line)
+            click.echo(f"report: {page}")
+        return found.exit_code
+
+    def measure(self, cases: Sequence[tuple[Group, int]], whole: bool) -> Side:
+        """Run what was not run yet; the side of all so far."""
+        recordings = [r for r in recordings_of(cases) if r not in self.records]
+        keys = {_key(recording): recording for recording in recordings}
+        missing = sum(key not in self.ledger for key in keys)
+        if missing < len(keys):
+            click.echo(f"{len(keys) - missing} of {len(keys)} recordings are there already", err=True)
+        progress = _Progress(total=missing)
+        workers = max(1, min(self.asked.workers or os.cpu_count() or 1, missing))
+        begun = time.perf_counter()
+        with open_executor(workers, self.asked.cluster if missing else None) as executor:
+            rows = campaign(
+                record_text, recordings, _key, executor, self.ledger,
+                lambda row: progress.say(keys[row.key], row),
+            )  # fmt: skip
+            for row in rows:
+                recording = keys[row.key]
+                text = failed_text(recording, row) if row.value is None else row.value
+                self.records[recording] = json.loads(text)
+        self.wall_s += time.perf_counter() - begun
+        self.fresh += missing
+        made = in_order(self.groups, made_of(list(self.records), list(self.records.values())))
+        return side_of(self.suite.name, {group.name: group for group in self.groups}, made, whole=whole)
+
+    def cost(self) -> str:
+        """What the run took, in words."""
+        now = f"{self.fresh} of them now in {self.wall_s:.0f} s" if self.fresh else "none of them now"
+        return f"{len(self.records)} recordings, {now}."
+
+
+def _key(recording: Recording) -> str:
+    return job_key(recording.job, groups=list(recording.groups))
+
+
+@dataclass(kw_only=True)
+class _Progress:
+    """A line on stderr for every recording, with the time left."""
+
+    total: int
+    count: int = 0
+    begun: float = field(default_factory=time.perf_counter)
+
+    def say(self, recording: Recording, row: Done) -> None:
+        self.count += 1
+        left_s = (time.perf_counter() - self.begun) / self.count * (self.total - self.count)
+        name = recording.groups[0].rpartition("/")[0]
+        click.echo(
+            f"[{self.count}/{self.total}] {name} seed {recording.job.seed}: {row.status} "
+            f"({left_s / 60:.1f} min left)",
+            err=True,
+        )
+
+
+def _seconds(side: Side, timings: Sequence[dict[str, Any]]) -> dict[str, float]:
+    """Seconds of work by case: those of its recording."""
+    made = {
+        (t["block"], t["scenario"], t["system"], t["faults"], t["seed"]): t["value"]
+        for t in timings
+        if t["metric"] == "recording_s"
+    }
+    found = {}
+    for name, of in side.groups.items():
+        block, scenario, system, faults, _ = name.split("/", 4)
+        for seed in of.runs:
+            key = (block, scenario, system, faults, int(seed))
+            if key in made:
+                found[f"{name}/{seed}"] = made[key]
+    return found
