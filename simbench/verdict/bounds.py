@@ -15,7 +15,7 @@ BCa passes too much. Studentised bootstrap: Efron & Tibshirani, An Introduction 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float64
@@ -34,6 +34,7 @@ NOTHING = 1e-12  # spread over size, at or below which values are equal but for 
 AT_ONCE = 4_000_000  # draws held at a time
 
 
+@runtime_checkable
 class Bounds(Protocol):
     """What a sample says about its mean."""
 

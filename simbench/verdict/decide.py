@@ -121,6 +121,10 @@ def _decided(blank: Judgement, paired: Differences, said: Bounds) -> Judgement:
         or (verdict == "REGRESSION" and flips.regression > alpha)
     ):
         notes.append("the sign-flip test does not agree")
+    if (paired.d == paired.d[0]).all():
+        notes.append(
+            f"all differences are equal; up to {1.0 - alpha ** (1.0 / n):.0%} of runs may still differ"
+        )
     return replace(
         blank, verdict=verdict, method=said.method, low=low, high=high, p_pass=said.p_at_most(-d),
         p_regression=said.p_at_least(-d), sign_flip=flips, note=_join(*notes),

@@ -9,21 +9,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Final, Literal, TypeAlias, get_args
+from typing import Final
 
 import numpy as np
 
 from simbench.verdict.decide import MARGIN, Judgement, judge
 from simbench.verdict.differences import Better, Values
 
-Look: TypeAlias = Literal[20, 40, 80]
-LOOKS: Final[tuple[Look, ...]] = get_args(Look)
-LEVELS: Final[Mapping[Look, float]] = {20: 0.0177, 40: 0.0185, 80: 0.0276}
-"""One-sided nominal p of each look."""
+LEVELS: Final[Mapping[int, float]] = {20: 0.0177, 40: 0.0185, 80: 0.0276}
+"""One-sided nominal p of the look at so many runs."""
+LOOKS: Final = tuple(LEVELS)
 
 
 def decide_at(
-    look: Look, old: Values, new: Values, *, better: Better, margin: float = MARGIN, rng: np.random.Generator,
+    look: int, old: Values, new: Values, *, better: Better, margin: float = MARGIN, rng: np.random.Generator,
     identical: bool = False,
 ) -> Judgement:  # fmt: skip
     """Judge the first `look` runs of both sides at this look's level.
@@ -45,6 +44,6 @@ def decide_at(
     return replace(judgement, note=f"{spent}; {judgement.note}" if judgement.note else spent)
 
 
-def next_look(runs: int) -> Look | None:
+def next_look(runs: int) -> int | None:
     """The first look beyond `runs` runs; None: there is none."""
     return next((look for look in LOOKS if look > runs), None)
