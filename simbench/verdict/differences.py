@@ -22,8 +22,8 @@ class Differences:
 
     d: in the order of the runs' keys as text, so that the order in which they came decides nothing. old, new:
     means over the same runs, as they were given; None without any. missing: runs without a value on either
-    side; lost: with the old value only; gained: with the new one only; only_old, only_new: runs that the other
-    side does not have at all.
+    side; lost: with the old value only; gained: with the new one only; only_old, only_new: runs that
+    the other side does not have at all.
     """
 
     d: Float64[np.ndarray, " n"]

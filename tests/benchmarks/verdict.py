@@ -96,15 +96,17 @@ def _ends(
     looks: Sequence[int], levels: Mapping[int, float],
 ) -> Ends:  # fmt: skip
     passed = regressed = both = 0
-    going = np.ones(len(d), dtype=bool)
+    going = open_yet = np.ones(len(d), dtype=bool)  # with the mean's gate alone, with both
     used = np.full(len(d), looks[-1])
     for look in looks:
         passes, regresses = (going & (side <= levels[look]) for side in p[look])
         passed += int(passes.sum())
         regressed += int(regresses.sum())
-        both += int((passes & share_passes(d[:, :look], levels[look])).sum())
         used[passes | regresses] = look
         going = going & ~(passes | regresses)
+        held = (p[look][0] <= levels[look]) & share_passes(d[:, :look], levels[look])
+        both += int((open_yet & held).sum())
+        open_yet = open_yet & ~held & (p[look][1] > levels[look])
     return Ends(passed=passed, regressed=regressed, both=both, runs=float(used.mean()))
 
 
