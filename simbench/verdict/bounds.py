@@ -7,9 +7,9 @@
 | >= 20 | studentised bootstrap over runs |
 
 A p-value here is the least alpha at which the bound lies beyond the limit, so p <= alpha exactly where the
-bound at alpha does. Studentised and not BCa, by measurement (docs/verdict.md): of a loss that few runs carry,
-BCa passes too much. Studentised bootstrap: Efron & Tibshirani, An Introduction to the Bootstrap, 1993, ch.
-12.5.
+bound at alpha does. Studentised and not BCa, by measurement (tests/benchmarks/verdict_methods.py): BCa passes
+more than alpha of the losses that few runs carry. Efron & Tibshirani, An Introduction to the Bootstrap, 1993,
+ch. 12.5.
 """
 
 from __future__ import annotations
