@@ -1,8 +1,8 @@
 """How many runs a verdict needs, from the spread that a pilot saw.
 
 Power of the one-sided t-test of paired differences, noncentral t. A pilot's SD is uncertain itself: plan with
-the upper limit that 80 % of pilots reach. The numbers hold for differences that look normal; where few runs carry
-the losses, a PASS needs two to four times as many (docs/verdict.md).
+the upper limit that 80 % of pilots reach. The numbers hold for differences that look normal; where few runs
+carry the losses, a PASS needs two to four times as many (docs/verdict.md).
 """
 
 from __future__ import annotations
