@@ -93,7 +93,8 @@ def groups_of(
         margins = _margins(suite.margins, where.at("margins"), metrics) | _margins(
             block.margins, place.at("margins"), metrics
         )
-        runs = tuple(seeds) if seeds is not None else seed_list(str(suite.seeds if block.seeds is None else block.seeds))
+        own_seeds = seed_list(str(suite.seeds if block.seeds is None else block.seeds))
+        runs = tuple(seeds) if seeds is not None else own_seeds
         for job, faults in _jobs(file, block, place):
             own = tuple(_pipeline(file, word) for word in block.pipelines or suite.pipelines)
             for pipeline in pipelines or own:
