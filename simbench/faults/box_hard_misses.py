@@ -118,12 +118,12 @@ def _judged(
     if total == 0.0:
         return judge(
             fault=spec.name, quantity=quantity, unit="%", requested=spec.percent, realised=spec.percent,
-            measured=None, estimator_sd=EXACT, allowed=0.0, note=NO_BOXES,
+            measured=None, systematic=5.0 * EXACT, allowed=0.0, note=NO_BOXES,
         )  # fmt: skip
     mean = total / len(hard)
     return judge(
         fault=spec.name, quantity=quantity, unit="%", requested=spec.percent,
-        realised=realised.get(quantity, 0.0), measured=100.0 * gone / total, estimator_sd=EXACT,
+        realised=realised.get(quantity, 0.0), measured=100.0 * gone / total, systematic=5.0 * EXACT,
         allowed=100.0 * share_allowed(0.01 * spec.percent * mean, len(hard)) / mean, note=NOTE,
     )  # fmt: skip
 

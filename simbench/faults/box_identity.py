@@ -90,14 +90,14 @@ def receipts(spec: IdentitySwitches, step: Step, site: Site) -> tuple[Receipt, .
     if frames == 0:
         one = judge(
             fault=spec.name, quantity=QUANTITY, unit="per s", requested=spec.per_s, realised=spec.per_s,
-            measured=None, estimator_sd=EXACT, allowed=0.0, note=NO_BOXES,
+            measured=None, systematic=5.0 * EXACT, allowed=0.0, note=NO_BOXES,
         )  # fmt: skip
     else:
         frame_s = time_s / frames
         one = judge(
             fault=spec.name, quantity=QUANTITY, unit="per s", requested=spec.per_s,
             realised=step.realised["per_s"],
-            measured=changes / (2.0 if spec.mode == "swap" else 1.0) / time_s, estimator_sd=EXACT,
+            measured=changes / (2.0 if spec.mode == "swap" else 1.0) / time_s, systematic=5.0 * EXACT,
             allowed=share_allowed(min(spec.per_s * frame_s, 1.0), frames) / frame_s, note=NOTE,
         )  # fmt: skip
     return (one, *keeps_boxes(spec, step, spoiled, "changed otherwise"), *spares(spec, step, site))

@@ -82,7 +82,7 @@ def receipts(spec: BoxLag, step: Step, site: Site) -> tuple[Receipt, ...]:
         judge(
             fault=spec.name, quantity="lag", unit="frames", requested=spec.lag_frames,
             realised=step.realised["lag_frames"],
-            measured=float(np.sum(way * moved)) / power if shows else None, estimator_sd=EXACT,
+            measured=float(np.sum(way * moved)) / power if shows else None, systematic=5.0 * EXACT,
             allowed=0.01 * spec.lag_frames, note=NOTE if shows else "no box moved",
         ),
         *keeps_boxes(spec, step, spoiled, "changed otherwise"),

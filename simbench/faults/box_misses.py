@@ -113,7 +113,7 @@ def receipts(spec: Misses, step: Step, site: Site) -> tuple[Receipt, ...]:
         result.append(
             judge(
                 fault=spec.name, quantity="a miss follows a miss", unit="share", requested=after_miss,
-                realised=step.realised["follows"], measured=sum(follow) / len(follow), estimator_sd=EXACT,
+                realised=step.realised["follows"], measured=sum(follow) / len(follow), systematic=5.0 * EXACT,
                 allowed=share_allowed(after_miss, len(follow)), note=NOTE,
             )
         )  # fmt: skip

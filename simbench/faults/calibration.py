@@ -94,7 +94,7 @@ def receipts(spec: CalibrationRotation, step: Telling, witness: Witness) -> tupl
                 requested=requested_deg,
                 realised=realised_deg,
                 measured=realised_deg + float(excess_deg @ axis),
-                estimator_sd=sd_deg,
+                systematic=5.0 * sd_deg,
                 allowed=max(0.01 * abs(spec.angle_deg), 0.05),
                 note=NOTE if sensor in seen else NO_WITNESS,
             )

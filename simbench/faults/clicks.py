@@ -92,7 +92,7 @@ def receipts(spec: ClickNoise, step: Telling, witness: Witness) -> tuple[Receipt
             judge(
                 fault=spec.name, quantity=f"{camera} clicks", unit="px", requested=spec.noise_px,
                 realised=realised, measured=realised * share if np.isfinite(share) else share,
-                estimator_sd=SD_PX + SD_SHARE * realised, allowed=_allowed_px(spec.noise_px, numbers),
+                systematic=5.0 * (SD_PX + SD_SHARE * realised), allowed=_allowed_px(spec.noise_px, numbers),
                 note=NOTE,
             )
         )  # fmt: skip
@@ -109,7 +109,7 @@ def _none_found(spec: ClickNoise, camera: str) -> Receipt:
     """The camera is told what was told before: the fault took no effect."""
     return judge(
         fault=spec.name, quantity=f"{camera} clicks", unit="px", requested=spec.noise_px,
-        realised=0.0, measured=0.0, estimator_sd=SD_PX, allowed=0.0,
+        realised=0.0, measured=0.0, systematic=5.0 * SD_PX, allowed=0.0,
         note="no calibration comes about: too few boards fit into the zone, or they do not determine a pose",
     )  # fmt: skip
 

@@ -52,7 +52,7 @@ def jpeg_receipts(spec: JpegLoss, step: Step, site: Site) -> tuple[Receipt, ...]
             judge(
                 fault=spec.name, quantity=quantity, unit=spec.unit, requested=float(spec.loss),
                 realised=step.realised[name], measured=None if found is None else 100.0 - found[0],
-                estimator_sd=0.0 if found is None else found[1], allowed=0.0,
+                systematic=0.0 if found is None else 5.0 * found[1], allowed=0.0,
                 note="multiples of the steps of the cosine transform"
                 if found is not None else "the pictures are too plain",
             )

@@ -109,7 +109,7 @@ def loss(
     """Of a share of lost points in per cent; the count is exact."""
     return judge(
         fault=fault, quantity=quantity, unit="%", requested=requested, realised=realised, measured=measured,
-        estimator_sd=10.0 / max(points, 1), allowed=allowed,
+        systematic=50.0 / max(points, 1), allowed=allowed,
         note=note if points else "no point to lose was measured",
     )  # fmt: skip
 

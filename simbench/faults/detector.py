@@ -76,7 +76,7 @@ def receipts(
     ) -> Receipt:
         return judge(
             fault=KEY, quantity=quantity, unit=unit, requested=requested, realised=drawn_value,
-            measured=measured if enough else None, estimator_sd=sd, allowed=allowed, note=note,
+            measured=measured if enough else None, systematic=5.0 * sd, allowed=allowed, note=note,
         )  # fmt: skip
 
     asked_rms = float(np.hypot(spec.sd_fraction, spec.bias_fraction))

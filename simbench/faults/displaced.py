@@ -60,8 +60,8 @@ def receipts(spec: CalibrationTranslation, step: Telling, witness: Witness) -> t
             judge(
                 fault=spec.name, quantity=f"{sensor} {spec.axis}", unit="cm",
                 requested=abs(spec.shift_cm) if spec.axis == "random" else spec.shift_cm,
-                realised=float(drawn_cm @ axis), measured=float(moved_cm(sensor) @ axis), estimator_sd=SD_CM,
-                allowed=max(0.01 * abs(spec.shift_cm), 1e-6), note=NOTE,
+                realised=float(drawn_cm @ axis), measured=float(moved_cm(sensor) @ axis),
+                systematic=5.0 * SD_CM, allowed=max(0.01 * abs(spec.shift_cm), 1e-6), note=NOTE,
             )
         )  # fmt: skip
     others = [(float(np.linalg.norm(moved_cm(name))), SD_CM) for name in spared(spec, witness.place)]

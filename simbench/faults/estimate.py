@@ -18,6 +18,9 @@ from jaxtyping import Float64, Int64
 from fusion.camera import PinholeCamera
 from fusion.geometry import skew
 from fusion.messages import EgoMotion
+from scenarios.scenario import ImuSensor
+from simbench.faults.gyro import GyroNoise, ideal_rates_radps
+from simbench.shake import BodyShake
 
 SLOWEST_MPS = 0.5
 PNP, PLATES = "PnP", "plates"
@@ -63,13 +66,38 @@ class PoseEvidence:
 class BodyAttitude:
     """The body's attitude by the gyro: small angles about the ego's axes, [n 3] in rad, less what the script
     turns and less its straight-line fit. `yaw_rad` [n]: the heading that the script turns to. `sd_rad`: what
-    the gyro's own noise adds (1 SD).
+    the gyro's own noise adds (1 SD). `noise`: that of its rates.
     """
 
     stamp_ns: Int64[np.ndarray, " n"]
     angle_rad: Float64[np.ndarray, "n 3"]
     yaw_rad: Float64[np.ndarray, " n"]
     sd_rad: float
+    noise: GyroNoise
+
+    @property
+    def period_s(self) -> float:
+        """Between two samples."""
+        return float(self.stamp_ns[-1] - self.stamp_ns[0]) * 1e-9 / max(len(self.stamp_ns) - 1, 1)
+
+    def expected_rad(self, shake: BodyShake) -> Float64[np.ndarray, "n 3"]:
+        """The angles that this gyro would give without noise on a body that shakes so."""
+        rates = ideal_rates_radps(shake, self.yaw_rad, self.stamp_ns)
+        return integrated_rad(rates, self.yaw_rad, self.stamp_ns)
+
+    def gain_sd(self, drawn_rad: Float64[np.ndarray, "f a"], t_ns: Int64[np.ndarray, " f"]) -> float:
+        """1 SD of how often angles at t_ns (as `seen`) are found in this attitude, by the gyro's noise; inf
+        where none are drawn."""
+        power = float(np.sum(drawn_rad**2))
+        if power == 0.0:
+            return float("inf")
+        place = np.interp(t_ns, self.stamp_ns, np.arange(len(self.stamp_ns)))
+        left = np.minimum(place.astype(np.int64), len(self.stamp_ns) - 2)
+        beyond = (place - left)[:, None]
+        weight = np.zeros((len(self.stamp_ns), drawn_rad.shape[1]))
+        np.add.at(weight, left, (1.0 - beyond) * drawn_rad)
+        np.add.at(weight, left + 1, beyond * drawn_rad)
+        return self.noise.sum_sd(weight, self.period_s) / power
 
     @property
     def rms_rad(self) -> float:
@@ -139,33 +167,46 @@ def gain(found: np.ndarray, drawn: np.ndarray) -> float:
 
 
 def gyro_attitude(
-    messages: Sequence[EgoMotion], scripted_yaw_rad: Float64[np.ndarray, " n"], noise_dps_rthz: float
+    messages: Sequence[EgoMotion],
+    scripted_yaw_rad: Float64[np.ndarray, " n"],
+    sensor: ImuSensor,
 ) -> BodyAttitude:
-    """Integrate the gyro. scripted_yaw_rad: heading of the script at the messages' stamps.
+    """Integrate the gyro. scripted_yaw_rad: heading of the script at the messages' stamps."""
+    stamp = np.array([m.stamp_ns for m in messages], dtype=np.int64)
+    yaw = np.unwrap(scripted_yaw_rad)
+    angle = integrated_rad(np.stack([m.rate_radps for m in messages]), yaw, stamp)
+    # White noise of the rate integrates to a random walk, about its straight line 0.26 of the end's SD on
+    # average.
+    span_s = float(stamp[-1] - stamp[0]) * 1e-9
+    walk = np.deg2rad(sensor.gyro_noise_dps_rthz) * np.sqrt(0.5 * span_s)
+    noise = GyroNoise.of(sensor, span_s / (len(stamp) - 1))
+    return BodyAttitude(stamp_ns=stamp, angle_rad=angle, yaw_rad=yaw, sd_rad=float(0.26 * walk), noise=noise)
+
+
+def integrated_rad(
+    rate_radps: Float64[np.ndarray, "n 3"],
+    yaw_rad: Float64[np.ndarray, " n"],
+    stamp_ns: Int64[np.ndarray, " n"],
+) -> Float64[np.ndarray, "n 3"]:
+    """Small angles about the ego's axes, less the script's heading and a straight line.
 
     A body that rolls and pitches reads a part of its pitch rate as yaw and so on; to first order of the
     angles (p + r pitch, q - r roll, r + q roll) this is undone. The angles are those sought: from round to
     round they err by the next power of the heading's swing over its factorial.
     """
-    stamp = np.array([m.stamp_ns for m in messages], dtype=np.int64)
-    rate = np.stack([m.rate_radps for m in messages])
-    step_s = np.diff(stamp)[:, None] * 1e-9
-    yaw = np.unwrap(scripted_yaw_rad)
+    step_s = np.diff(stamp_ns)[:, None] * 1e-9
 
-    def integrated(rate_radps: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
-        steps = 0.5 * (rate_radps[1:] + rate_radps[:-1]) * step_s
+    def summed(rate: Float64[np.ndarray, "n 3"]) -> Float64[np.ndarray, "n 3"]:
+        steps = 0.5 * (rate[1:] + rate[:-1]) * step_s
         angle = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-        angle[:, 2] -= yaw
+        angle[:, 2] -= yaw_rad
         return detrended(angle)
 
-    angle, (_, q, r) = integrated(rate), rate.T
+    angle, (_, q, r) = summed(rate_radps), rate_radps.T
     for _ in range(ROUNDS):
         roll, pitch, _ = angle.T
-        angle = integrated(rate + np.stack([r * pitch, -r * roll, q * roll], axis=1))
-    # White noise of the rate integrates to a random walk, about its straight line 0.26 of the end's SD on
-    # average.
-    walk = np.deg2rad(noise_dps_rthz) * np.sqrt(0.5 * (stamp[-1] - stamp[0]) * 1e-9)
-    return BodyAttitude(stamp_ns=stamp, angle_rad=angle, yaw_rad=yaw, sd_rad=float(0.26 * walk))
+        angle = summed(rate_radps + np.stack([r * pitch, -r * roll, q * roll], axis=1))
+    return angle
 
 
 def lever_shift_m(item: PoseEvidence) -> Float64[np.ndarray, "f 3"]:

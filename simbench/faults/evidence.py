@@ -19,7 +19,7 @@ def body_of(captured: Captured, rig: SensorRig) -> BodyAttitude | None:
         return None
     gyro = captured.measured.motions
     R_ego, _ = captured.motion.ego(np.array([m.stamp_ns for m in gyro], dtype=np.int64))
-    return gyro_attitude(gyro, np.arctan2(R_ego[:, 1, 0], R_ego[:, 0, 0]), rig.imu.gyro_noise_dps_rthz)
+    return gyro_attitude(gyro, np.arctan2(R_ego[:, 1, 0], R_ego[:, 0, 0]), rig.imu)
 
 
 def cameras_of(captured: Captured, rig: SensorRig) -> tuple[PoseEvidence, ...]:

@@ -97,7 +97,7 @@ def receipts(spec: FalseBoxes, step: Step, site: Site) -> tuple[Receipt, ...]:
         return (
             judge(
                 fault=spec.name, quantity=QUANTITY, unit="boxes", requested=spec.boxes_per_image,
-                realised=spec.boxes_per_image, measured=None, estimator_sd=EXACT, allowed=0.0,
+                realised=spec.boxes_per_image, measured=None, systematic=5.0 * EXACT, allowed=0.0,
                 note="no image was taken",
             ),
         )  # fmt: skip
@@ -105,7 +105,7 @@ def receipts(spec: FalseBoxes, step: Step, site: Site) -> tuple[Receipt, ...]:
     return (
         judge(
             fault=spec.name, quantity=QUANTITY, unit="boxes", requested=spec.boxes_per_image,
-            realised=step.realised["boxes_per_image"], measured=more / images, estimator_sd=EXACT,
+            realised=step.realised["boxes_per_image"], measured=more / images, systematic=5.0 * EXACT,
             allowed=count_allowed(spec.boxes_per_image * images) / images + 1e-9, note=NOTE,
         ),
         *keeps_boxes(spec, step, spoiled, "boxes lost, outside, or with a known id"),

@@ -54,7 +54,7 @@ def lever_receipts(spec: ReferenceLever, step: Step, site: Site) -> tuple[Receip
         judge(
             fault=spec.name, quantity=quantity, unit="m", requested=length_m,
             realised=step.realised["arm_m"], measured=measured_m,
-            estimator_sd=SD_M + 0.1 * length_m * turn_rad**2, allowed=0.01 * length_m, note=SHIFT_NOTE,
+            systematic=5.0 * SD_M + 0.5 * length_m * turn_rad**2, allowed=0.01 * length_m, note=SHIFT_NOTE,
         ),
         *untouched(
             fault=spec.name, quantity="shift across the arm", unit="m",
@@ -76,7 +76,7 @@ def bias_receipts(spec: ReferenceBias, step: Step, site: Site) -> tuple[Receipt,
         judge(
             fault=spec.name, quantity="bias", unit="cm", requested=spec.bias_cm,
             realised=step.realised["bias_cm"], measured=1e2 * float(np.linalg.norm(mean_m)),
-            estimator_sd=1e2 * SD_M, allowed=0.01 * spec.bias_cm, note=SHIFT_NOTE,
+            systematic=5e2 * SD_M, allowed=0.01 * spec.bias_cm, note=SHIFT_NOTE,
         ),
         *untouched(
             fault=spec.name, quantity="change of the bias", unit="m",
@@ -96,7 +96,7 @@ def noise_receipts(spec: ReferenceNoise, step: Step, site: Site) -> tuple[Receip
         judge(
             fault=spec.name, quantity="noise (SD)", unit="cm", requested=spec.noise_cm,
             realised=step.realised["noise_cm"], measured=1e2 * float(np.sqrt(np.mean(moved_m**2))),
-            estimator_sd=1e2 * SD_M, allowed=5.0 * spec.noise_cm / np.sqrt(2.0 * moved_m.size),
+            systematic=5e2 * SD_M, allowed=5.0 * spec.noise_cm / np.sqrt(2.0 * moved_m.size),
             note=SHIFT_NOTE,
         ),
         *adds_up(spec, step),
@@ -115,14 +115,14 @@ def float_receipts(spec: ReferenceFloat, step: Step, site: Site) -> tuple[Receip
     duration = judge(
         fault=spec.name, quantity=quantity, unit="s", requested=asked_s,
         realised=step.realised["duration_s"], measured=float(hit.sum()) * period_s,
-        estimator_sd=SD_M, allowed=1.01 * period_s, note=SHIFT_NOTE,
+        systematic=5.0 * SD_M, allowed=1.01 * period_s, note=SHIFT_NOTE,
     )  # fmt: skip
     if not step.realised["duration_s"] and not hit.any():
         return (duration,)
     size = judge(
         fault=spec.name, quantity="offset while floating", unit="m",
         requested=0.5 * (spec.least_m + spec.most_m), realised=step.realised["length_m"],
-        measured=float(far_m[hit].mean()) if hit.any() else 0.0, estimator_sd=SD_M,
+        measured=float(far_m[hit].mean()) if hit.any() else 0.0, systematic=5.0 * SD_M,
         allowed=0.5 * (spec.most_m - spec.least_m) + SD_M, note=SHIFT_NOTE,
     )  # fmt: skip
     return duration, size, *adds_up(spec, step)
@@ -142,7 +142,7 @@ def heading_receipts(spec: ReferenceHeading, step: Step, site: Site) -> tuple[Re
     return (
         judge(
             fault=spec.name, quantity="heading", unit="deg", requested=spec.heading_deg,
-            realised=step.realised["heading_deg"], measured=found_deg, estimator_sd=SD_DEG,
+            realised=step.realised["heading_deg"], measured=found_deg, systematic=5.0 * SD_DEG,
             allowed=max(0.01 * abs(spec.heading_deg), SD_DEG), note="turn of the fixes about the ego",
         ),
         *untouched(

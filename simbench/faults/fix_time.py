@@ -88,8 +88,9 @@ def period_receipts(spec: ReferencePeriod, step: Step, site: Site) -> tuple[Rece
     return (
         judge(
             fault=spec.name, quantity=quantity, unit="s", requested=spec.period_s,
-            realised=step.realised.get("period_s", 0.0), measured=float(span_s) / steps, estimator_sd=SD_S,
-            allowed=0.01 * spec.period_s + own_s / max(int(run_s / spec.period_s), 1), note=FIXES_NOTE,
+            realised=step.realised.get("period_s", 0.0), measured=float(span_s) / steps,
+            systematic=5.0 * SD_S, allowed=0.01 * spec.period_s + own_s / max(int(run_s / spec.period_s), 1),
+            note=FIXES_NOTE,
         ),
         *adds_up(spec, step),
     )  # fmt: skip
@@ -107,7 +108,7 @@ def outage_receipts(spec: ReferenceOutage, step: Step, site: Site) -> tuple[Rece
         judge(
             fault=spec.name, quantity=quantity, unit="s",
             requested=shown_s(before, spec.at_s, spec.duration_s), realised=step.realised["duration_s"],
-            measured=(len(gone_s) if not stray else -stray) * own_s, estimator_sd=SD_S,
+            measured=(len(gone_s) if not stray else -stray) * own_s, systematic=5.0 * SD_S,
             allowed=1.01 * own_s, note=FIXES_NOTE,
         ),
         *adds_up(spec, step),
@@ -125,7 +126,7 @@ def lag_receipts(spec: ReferenceLag, step: Step, site: Site) -> tuple[Receipt, .
         judge(
             fault=spec.name, quantity=quantity, unit="ms", requested=spec.lag_ms,
             realised=step.realised["lag_ms"], measured=float(np.mean(late_ms)) if len(late_ms) else None,
-            estimator_sd=SD_MS, allowed=max(0.01 * spec.lag_ms, SD_MS), note="when each fix is known",
+            systematic=5.0 * SD_MS, allowed=max(0.01 * spec.lag_ms, SD_MS), note="when each fix is known",
         ),
         *adds_up(spec, step),
     )  # fmt: skip

@@ -47,7 +47,7 @@ def unverifiable(spec: FaultSpec, quantity: str, requested: float, why: str) -> 
     return (
         judge(
             fault=spec.name, quantity=quantity, unit=spec.unit, requested=requested, realised=requested,
-            measured=None, estimator_sd=EXACT_M, allowed=0.0, note=why,
+            measured=None, systematic=5.0 * EXACT_M, allowed=0.0, note=why,
         ),
     )  # fmt: skip
 

@@ -75,8 +75,8 @@ def focal_receipts(spec: FocalLength, step: Telling, witness: Witness) -> tuple[
     result = [
         judge(
             fault=spec.name, quantity=f"{camera} {side}", unit="%", requested=spec.percent,
-            realised=step.realised.get(camera, 0.0), measured=float(larger), estimator_sd=SCALE_SD_PERCENT,
-            allowed=0.01 * abs(spec.percent), note=NOTE,
+            realised=step.realised.get(camera, 0.0), measured=float(larger),
+            systematic=5.0 * SCALE_SD_PERCENT, allowed=0.01 * abs(spec.percent), note=NOTE,
         )
         for camera in struck(spec, witness.place)
         for side, larger in zip(("width", "height"), _larger_percent(step, camera), strict=True)
@@ -103,7 +103,7 @@ def shift_receipts(spec: PixelShift, step: Telling, witness: Witness) -> tuple[R
             result.append(
                 judge(
                     fault=spec.name, quantity=f"{camera} {side}", unit="px", requested=requested,
-                    realised=realised, measured=float(moved[i]), estimator_sd=SHIFT_SD_PX,
+                    realised=realised, measured=float(moved[i]), systematic=5.0 * SHIFT_SD_PX,
                     allowed=max(0.01 * abs(requested), 1e-6), note=NOTE,
                 )
             )  # fmt: skip

@@ -77,11 +77,11 @@ def judge_share(
     if of == 0:
         return judge(
             fault=spec.name, quantity=quantity, unit="%", requested=percent, realised=percent,
-            measured=None, estimator_sd=EXACT, allowed=0.0, note=NO_BOXES,
+            measured=None, systematic=5.0 * EXACT, allowed=0.0, note=NO_BOXES,
         )  # fmt: skip
     return judge(
         fault=spec.name, quantity=quantity, unit="%", requested=percent,
-        realised=step.realised.get("percent", 0.0), measured=100.0 * found / of, estimator_sd=EXACT,
+        realised=step.realised.get("percent", 0.0), measured=100.0 * found / of, systematic=5.0 * EXACT,
         allowed=100.0 * share_allowed(0.01 * percent, of if free is None else free), note=note,
     )  # fmt: skip
 

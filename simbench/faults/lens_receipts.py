@@ -58,7 +58,7 @@ def defocus_receipts(spec: Defocus, step: Step, site: Site) -> tuple[Receipt, ..
             judge(
                 fault=spec.name, quantity=quantity, unit=spec.unit, requested=spec.radius_px,
                 realised=step.realised[name], measured=measured,
-                estimator_sd=float(weight.sum() ** -0.5) if found else 0.0, allowed=1e-9,
+                systematic=5.0 * float(weight.sum() ** -0.5) if found else 0.0, allowed=1e-9,
                 note="transfer function of a disc between patches before and after"
                 if found else "nothing in the pictures is sharp enough, or they are too small",
             )
@@ -169,7 +169,7 @@ def dirt_receipts(spec: Dirt, step: Step, site: Site) -> tuple[Receipt, ...]:
             result.append(
                 judge(
                     fault=spec.name, quantity=f"{name} {what}", unit=unit, requested=requested,
-                    realised=step.realised.get(f"{name} {what}", 0.0), measured=measured, estimator_sd=sd,
+                    realised=step.realised.get(f"{name} {what}", 0.0), measured=measured, systematic=5.0 * sd,
                     allowed=allowed,
                     note="light of each pixel, after over before" if found else "most of it is black",
                 )

@@ -68,7 +68,7 @@ def receipts(spec: CalibrationMixup, step: Telling, witness: Witness) -> tuple[R
             judge(
                 fault=spec.name, quantity=f"{name} {spec.what}", unit="share", requested=1.0,
                 realised=1.0 if share is None else step.realised.get(name, 0.0), measured=share,
-                estimator_sd=SD_SHARE, allowed=0.0, note=note,
+                systematic=5.0 * SD_SHARE, allowed=0.0, note=note,
             )
         )  # fmt: skip
     rest = place.cameras if spec.what == "cameras_swapped" else spared(spec, place)

@@ -10,9 +10,11 @@ plates) less the gyro's for the brackets.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int64
+from scipy.spatial.transform import Rotation
 
 from scenarios.faults import Flex, Vibration
 from scenarios.seeding import stream
@@ -31,6 +33,7 @@ from simbench.shake import BodyShake, Shake, draw_shake
 
 VIBRATION, FLEX = "motion.vibration_deg", "motion.flex_deg"
 NOTE = "{} attitude by {} less the body's by gyro"
+PNP_DEG = 1e-4
 TO_DEG_AND_M = np.array([np.rad2deg(1.0)] * 3 + [1.0])
 AXES = (  # of a body shake: name, unit, what measures it
     ("roll", "deg", "integrated gyro"),
@@ -144,8 +147,9 @@ def shake_receipts(
             unit=unit,
             requested=float(asked[axis]),
             realised=float(drawn[axis]),
-            measured=found[axis][0],
-            estimator_sd=float(found[axis][1]),
+            measured=found[axis].value,
+            estimator_sd=found[axis].sd,
+            systematic=found[axis].systematic,
             allowed=allowed * float(asked[axis]),
             note=note,
         )
@@ -160,37 +164,48 @@ def drawn_rms(realised: BodyShake | None, duration_s: float) -> Float64[np.ndarr
     return rms
 
 
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """An RMS, what it errs by at random (1 SD), and what else at most; None without the sensors for it."""
+
+    value: float | None = None
+    sd: float = 0.0
+    systematic: float = 0.0
+
+
 def found_rms(
     realised: BodyShake | None,
     duration_s: float,
     body: BodyAttitude | None,
     evidence: Sequence[PoseEvidence],
-) -> list[tuple[float | None, float]]:
-    """(found, SD of the estimate) of roll, pitch, yaw in degrees and heave in metres; found is None without
-    the sensors for it.
+) -> list[Found]:
+    """Of roll, pitch, yaw in degrees and heave in metres.
 
     Roll, pitch and yaw by the integrated gyro; heave, which no gyro sees, by the cameras' height (PnP) less
     what their lever arm explains. Each is how often the drawn shake is contained in what was measured, times
     its RMS: signed, and near 0 when something else shook.
     """
     drawn = drawn_rms(realised, duration_s)
-    found: list[tuple[float | None, float]] = [(None, 0.0)] * 4
+    found = [Found()] * 4
     if body is not None:
-        inside = body.stamp_ns < duration_s * 1e9
-        seen_ns = body.stamp_ns[inside]
-        signal = body.seen(_at(realised, seen_ns)[:, :3], seen_ns)
-        angle = body.seen(body.angle_rad[inside], seen_ns)
+        inside = (body.stamp_ns >= 0) & (body.stamp_ns < duration_s * 1e9)
+        t_ns = body.stamp_ns[inside]
+        expected = np.zeros_like(body.angle_rad) if realised is None else body.expected_rad(realised)
+        signal, angle = body.seen(expected[inside], t_ns), body.seen(body.angle_rad[inside], t_ns)
         for axis in range(3):
-            # Gyro noise, its sampling, and what is left of turns about three axes not commuting: no gyro sees
-            # the mean of the shake over the run, which is the larger the shorter the run.
-            worst = float(np.deg2rad(drawn[:3].max()))
-            left = np.rad2deg(0.5 / duration_s * worst**2 + 0.1 * worst**3)
-            sd = np.rad2deg(body.sd_rad) / np.sqrt(3.0) + 0.004 * drawn[axis] + left
-            found[axis] = _contained(angle[:, axis], signal[:, axis], drawn[axis], TO_DEG_AND_M[axis]), sd
+            one = signal[:, axis : axis + 1]
+            still = drawn[axis] == 0.0 or not np.any(one)
+            found[axis] = Found(
+                value=_contained(angle[:, axis], signal[:, axis], drawn[axis], TO_DEG_AND_M[axis]),
+                sd=float(np.rad2deg(body.sd_rad)) if still else float(drawn[axis]) * body.gain_sd(one, t_ns),
+                systematic=body.noise.biased_share() * float(drawn[:3].max()),
+            )
     if evidence:
         height = np.concatenate([detrended(e.shift_m[:, 2:] - lever_shift_m(e)[:, 2:]) for e in evidence])
         signal = np.concatenate([detrended(_at(realised, e.taken_ns)[:, 3:]) for e in evidence])
-        found[3] = _contained(height, signal, drawn[3], 1.0), _heave_sd_m(evidence, body)
+        found[3] = Found(
+            value=_contained(height, signal, drawn[3], 1.0), systematic=_most_bent_m(evidence, body)
+        )
     return found
 
 
@@ -213,9 +228,9 @@ def _seen(
     return detrended(turn_rad) if body is None else body.seen(turn_rad, item.taken_ns)
 
 
-def _heave_sd_m(evidence: Sequence[PoseEvidence], body: BodyAttitude | None) -> float:
+def _most_bent_m(evidence: Sequence[PoseEvidence], body: BodyAttitude | None) -> float:
     """A bracket that bends is taken for a turn of the body: its bending times the lever arm, over all
-    frames.
+    frames, five times.
     """
     floor_m = 1e-4
     errors = []
@@ -223,7 +238,24 @@ def _heave_sd_m(evidence: Sequence[PoseEvidence], body: BodyAttitude | None) -> 
         bending = item.turn_rad if body is None else bracket_turn_rad(item, body)
         arm_m = float(np.linalg.norm((item.position_ego_m - item.pivot_ego_m)[:2]))
         errors.append(arm_m * float(detrended(bending).std(axis=0).max()))
-    return floor_m + float(np.sqrt(np.mean(np.square(errors)) / sum(e.frames for e in evidence)))
+    return 5.0 * (floor_m + float(np.sqrt(np.mean(np.square(errors)) / sum(e.frames for e in evidence))))
+
+
+def _turns_rad(shake: Shake, item: PoseEvidence) -> Float64[np.ndarray, "f 3"]:
+    """As rotation vectors, which is what PnP is told in."""
+    turns: np.ndarray = Rotation.from_euler("xyz", shake.at(item.taken_ns)[:, :3]).as_rotvec()
+    return turns
+
+
+def _bracket_sd_deg(
+    rms_deg: float, drawn_rad: Float64[np.ndarray, "f 3"], item: PoseEvidence, body: BodyAttitude | None
+) -> float:
+    """Of an RMS over three axes: PnP on known points is exact, the gyro is not."""
+    if body is None:
+        return 0.0
+    if not np.any(drawn_rad):
+        return float(np.rad2deg(body.sd_rad))
+    return rms_deg * body.gain_sd(drawn_rad, item.taken_ns)
 
 
 def flex_receipts(
@@ -244,13 +276,14 @@ def flex_receipts(
         # What the gyro leaves of the body's shake: it is sampled, and turns about several axes do not
         # commute.
         left = 0.02 * float(bending.std()) if body is None else body.rms_rad * (0.005 + 0.5 * body.rms_rad)
-        left_deg = float(np.rad2deg(left + (0.0 if body is None else body.sd_rad)))
+        left_deg = float(np.rad2deg(left))
         if item.sensor not in cameras:
-            others.append((float(np.rad2deg(np.std(bending))), 0.002 + left_deg))
+            noise_deg = 0.0 if body is None else float(np.rad2deg(body.sd_rad))
+            others.append((float(np.rad2deg(np.std(bending))), 0.002 + left_deg + noise_deg))
             continue
         shake = realised.get(item.sensor)
         rms = 0.0 if shake is None else float(np.rad2deg(np.sqrt(np.mean(shake.rms(duration_s) ** 2))))
-        drawn = np.zeros_like(bending) if shake is None else _seen(shake.at(item.taken_ns), item, body)
+        drawn = np.zeros_like(bending) if shake is None else _seen(_turns_rad(shake, item), item, body)
         result.append(
             judge(
                 fault=FLEX,
@@ -259,8 +292,11 @@ def flex_receipts(
                 requested=spec.rms_deg,
                 realised=rms,
                 measured=_contained(bending, drawn, rms, float(np.rad2deg(1.0))),
-                # Large turns about three axes do not commute.
-                estimator_sd=0.001 + left_deg / np.sqrt(item.frames) + 0.1 * float(np.deg2rad(rms)) * rms,
+                estimator_sd=_bracket_sd_deg(rms, drawn, item, body),
+                # Turns of body and bracket do not commute; nothing else errs where no gyro is needed.
+                systematic=PNP_DEG
+                + 5.0 * left_deg / np.sqrt(item.frames)
+                + (0.0 if body is None else body.rms_rad * rms),
                 allowed=0.01 * spec.rms_deg,
                 note=NOTE.format(item.kind, item.by),
             )

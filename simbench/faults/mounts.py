@@ -73,7 +73,7 @@ def knock_receipts(
                 fault=spec.name, quantity=f"{item.sensor} {spec.axis}", unit="deg",
                 requested=spec.angle_deg if happens else 0.0,
                 realised=float(np.rad2deg(ramp.end[column])) if ramp is not None and happens else 0.0,
-                measured=found, estimator_sd=SD_DEG + sd, allowed=0.01 * abs(spec.angle_deg), note=note,
+                measured=found, systematic=5.0 * (SD_DEG + sd), allowed=0.01 * abs(spec.angle_deg), note=note,
             )
         )  # fmt: skip
     called, by = others_of(evidence, cameras)
@@ -111,7 +111,7 @@ def drift_receipts(
                 judge(
                     fault=spec.name, quantity=f"{item.sensor} {spec.axis}", unit="deg",
                     requested=spec.angle_deg, realised=float(np.rad2deg(end[turn])), measured=found_deg,
-                    estimator_sd=SD_DEG + sd_deg, allowed=0.01 * abs(spec.angle_deg),
+                    systematic=5.0 * (SD_DEG + sd_deg), allowed=0.01 * abs(spec.angle_deg),
                     note=TURN_NOTE.format(item.by),
                 )
             )  # fmt: skip
@@ -122,7 +122,7 @@ def drift_receipts(
                 judge(
                     fault=spec.name, quantity=f"{item.sensor} {spec.along}", unit="cm",
                     requested=spec.shift_cm, realised=100.0 * float(end[3 + shift]), measured=found_cm,
-                    estimator_sd=SD_CM + sd_cm, allowed=0.01 * abs(spec.shift_cm),
+                    systematic=5.0 * (SD_CM + sd_cm), allowed=0.01 * abs(spec.shift_cm),
                     note=SHIFT_NOTE.format(item.by),
                 )
             )  # fmt: skip

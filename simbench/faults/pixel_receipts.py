@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
-from math import hypot, log, sqrt
+from math import log, sqrt
 
 import numpy as np
 from jaxtyping import Float64
@@ -34,7 +34,7 @@ TRIALS = np.array(
     [0, 0.1, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 1, 1.02, 1.05, 1.1, 1.2, 1.35, 1.5, 2, 3, 5]
 )  # times the strength that is asked for
 ASKED = int(np.searchsorted(TRIALS, 1.0))
-MODEL_SD = 0.002  # of the strength: counts of a few electrons are not quite normal, even with their skewness
+MODEL_SHARE = 0.002  # of the strength, at most: few electrons are not quite normal, even with their skewness
 
 Electrons = tuple[float, float]
 Levels = Float64[np.ndarray, "256 1"]
@@ -58,7 +58,7 @@ def exposure_receipts(spec: WrongExposure, step: Step, site: Site) -> tuple[Rece
             judge(
                 fault=spec.name, quantity=quantity, unit=spec.unit, requested=spec.stops,
                 realised=step.realised[name], measured=None if found is None else found[0],
-                estimator_sd=0.0 if found is None else found[1], allowed=1e-9,
+                systematic=0.0 if found is None else 5.0 * found[1], allowed=1e-9,
                 note=note if found is not None else "hardly a pixel is neither black nor white",
             )
         )  # fmt: skip
@@ -111,17 +111,19 @@ def _of_noise(spec: FaultSpec, step: Step, site: Site, what: str, read: Reading)
     strength = float(getattr(spec, spec.strength))
     result, alike = [], []
     for name in struck(spec, site.rig):
-        quantity, both = f"{name} {what}", [pair.thinned() for pair in pairs(step, site, name)]
-        if not both:
+        quantity, whole = f"{name} {what}", pairs(step, site, name)
+        if not whole:
             result.append(unseen(spec.name, quantity, spec.unit, strength))
             continue
-        found = _strength(both, _curve(read, strength, _electrons(site.rig.cameras[name])))
+        both = [pair.thinned() for pair in whole]
+        drawn = sum(pair.before.size for pair in whole) if read is _noisy else None
+        found = _strength(both, _curve(read, strength, _electrons(site.rig.cameras[name])), drawn)
         pixels = sum(pair.before.size for pair in both)
         result.append(
             judge(
                 fault=spec.name, quantity=quantity, unit=spec.unit, requested=strength,
                 realised=step.realised[name], measured=None if found is None else found[0],
-                estimator_sd=0.0 if found is None else hypot(found[1], MODEL_SD * strength),
+                estimator_sd=0.0 if found is None else found[1], systematic=MODEL_SHARE * strength,
                 allowed=max(5.0 * strength / sqrt(2.0 * pixels), 0.001 * strength),
                 note="squared changes of linear light by level of brightness"
                 if found is not None else "too few pixels in which it would be seen",
@@ -147,12 +149,14 @@ def _electrons(sensor: CameraSensor) -> Electrons:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Curve:
-    """What trial strengths would do: mean squared change of linear light [trial level]; `fourth`: mean fourth
-    power at the strength that is asked for."""
+    """What trial strengths would do: mean squared change of linear light [trial level]. At the strength that
+    is asked for, `fourth`: mean fourth power; `shared`: covariance of the squared change with the square of
+    the normal number behind it."""
 
     strength: Float64[np.ndarray, " t"]
     square: Float64[np.ndarray, "t 256"]
     fourth: Float64[np.ndarray, "256"]
+    shared: Float64[np.ndarray, "256"]
 
 
 @lru_cache(maxsize=16)
@@ -166,11 +170,14 @@ def _curve(read: Reading, about: float, sensor: Electrons) -> Curve:
         strength=about * TRIALS,
         square=np.stack([change(float(s)) ** 2 @ WEIGHT for s in about * TRIALS]),
         fourth=np.asarray(change(about) ** 4 @ WEIGHT),
+        shared=np.asarray(change(about) ** 2 * (Z**2 - 1.0) @ WEIGHT),
     )
 
 
-def _strength(both: list[Pair], curve: Curve) -> tuple[float, float] | None:
-    """The strength that explains the squared changes, and its SD; None where it would not be seen."""
+def _strength(both: list[Pair], curve: Curve, drawn: int | None) -> tuple[float, float] | None:
+    """The strength that explains the squared changes, and its SD; None where it would not be seen. drawn: so
+    many normal numbers in all were drawn, of which the RMS is what was realised: what they and the squared
+    changes scatter together is no error."""
     count, power = np.zeros(256), np.zeros(256)
     for pair in both:
         level, change = pair.before.ravel(), (light_of(pair.after) - light_of(pair.before)).ravel()
@@ -188,7 +195,12 @@ def _strength(both: list[Pair], curve: Curve) -> tuple[float, float] | None:
         return None
     measured = float(np.interp(weight @ power, np.maximum.accumulate(total), curve.strength))
     spread = sqrt(float(np.sum(weight**2 * count * np.maximum(curve.fourth - expected**2, 0.0))))
-    return measured, spread / float(slope)
+    sd = spread / float(slope)
+    if drawn is None:
+        return measured, sd
+    realised_sd = float(curve.strength[ASKED]) / sqrt(2.0 * drawn)
+    along = 2.0 * realised_sd**2 / float(curve.strength[ASKED]) * float(np.sum(weight * count * curve.shared))
+    return measured, sqrt(max(sd**2 + realised_sd**2 - along / float(slope), 0.0))
 
 
 def _alike(one: Pair, two: Pair) -> tuple[float, float]:

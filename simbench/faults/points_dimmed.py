@@ -129,7 +129,7 @@ def shorten_receipts(spec: ReducedRange, step: Step, site: Site) -> tuple[Receip
     return (
         judge(
             fault=spec.name, quantity="range lost", unit="%", requested=spec.lost_percent,
-            realised=step.realised["range"], measured=measured, estimator_sd=DIM_SD_PERCENT,
+            realised=step.realised["range"], measured=measured, systematic=5.0 * DIM_SD_PERCENT,
             allowed=0.01 * spec.lost_percent, note=note,
         ),
         _counted(spec.name, "points lost", both, real, chance, step.realised["of all"]),
@@ -173,7 +173,7 @@ def _light(
     enough = len(kept) >= FEWEST
     return judge(
         fault=fault, quantity=quantity, unit="%", requested=requested, realised=step.realised["through"],
-        measured=100.0 * float(np.median(kept)) if enough else None, estimator_sd=DIM_SD_PERCENT,
+        measured=100.0 * float(np.median(kept)) if enough else None, systematic=5.0 * DIM_SD_PERCENT,
         allowed=0.01 * requested,
         note="intensities after against before" if enough else f"only {len(kept)} points are left there",
     )  # fmt: skip

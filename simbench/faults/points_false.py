@@ -58,7 +58,7 @@ def haunt_receipts(spec: Ghosts, step: Step, site: Site) -> tuple[Receipt, ...]:
         judge(
             fault=spec.name, quantity="false points", unit="% of firings", requested=spec.percent,
             realised=step.realised["ghosts"], measured=100.0 * count / n if n else None,
-            estimator_sd=10.0 / max(n, 1), allowed=100.0 * share_allowed(0.01 * spec.percent, n),
+            systematic=50.0 / max(n, 1), allowed=100.0 * share_allowed(0.01 * spec.percent, n),
             note="new points on no part of anything",
         ),
         judge(

@@ -153,12 +153,12 @@ def lose_beams_receipts(spec: BeamLoss, step: Step, site: Site) -> tuple[Receipt
         judge(
             fault=spec.name, quantity="rings", unit="%", requested=spec.percent,
             realised=step.realised["rings"], measured=100.0 * silent / n if n else None,
-            estimator_sd=EXACT_PERCENT + 100.0 * unheard, allowed=100.0 / rings, note=note,
+            systematic=5.0 * (EXACT_PERCENT + 100.0 * unheard), allowed=100.0 / rings, note=note,
         ),
         judge(
             fault=spec.name, quantity="rings that fall silent", unit="rings",
             requested=step.realised["heard"], realised=step.realised["heard"],
-            measured=float(silent) if n else None, estimator_sd=0.1, allowed=0.0, note=note,
+            measured=float(silent) if n else None, systematic=0.5, allowed=0.0, note=note,
         ),
         *points_as_before(spec.name, both),
     )  # fmt: skip

@@ -65,7 +65,7 @@ def noise_receipts(spec: RangeNoise, step: Step, site: Site) -> tuple[Receipt, .
             fault=spec.name, quantity="range noise (RMS)", unit="cm", requested=spec.sd_cm,
             realised=step.realised["rms_cm"],
             measured=float(np.sqrt(np.mean(change_cm**2))) if enough else None,
-            estimator_sd=RANGE_SD_CM,
+            systematic=5.0 * RANGE_SD_CM,
             allowed=5.0 * spec.sd_cm / np.sqrt(2.0 * max(len(change_cm), 1)),
             note=RANGE_NOTE if enough else f"only {len(change_cm)} points",
         ),
@@ -97,7 +97,7 @@ def bias_receipts(spec: RangeBias, step: Step, site: Site) -> tuple[Receipt, ...
     return (
         judge(
             fault=spec.name, quantity="range bias", unit="cm", requested=spec.bias_cm,
-            realised=step.realised["bias_cm"], measured=middle, estimator_sd=POINT_RANGE_SD_CM,
+            realised=step.realised["bias_cm"], measured=middle, systematic=5.0 * POINT_RANGE_SD_CM,
             allowed=0.01 * abs(spec.bias_cm), note=note,
         ),
         *untouched(
@@ -148,7 +148,7 @@ def turn_receipts(spec: AzimuthError, step: Step, site: Site) -> tuple[Receipt, 
         judge(
             fault=spec.name, quantity="azimuth offset", unit="deg", requested=spec.offset_deg,
             realised=step.realised["offset_deg"], measured=None if fit is None else float(fit[0]),
-            estimator_sd=TURN_SD_DEG, allowed=0.01 * abs(spec.offset_deg), note=note,
+            systematic=5.0 * TURN_SD_DEG, allowed=0.01 * abs(spec.offset_deg), note=note,
         )
     ]  # fmt: skip
     if spec.eccentricity_deg > 0.0:
@@ -157,7 +157,7 @@ def turn_receipts(spec: AzimuthError, step: Step, site: Site) -> tuple[Receipt, 
         result.append(
             judge(
                 fault=spec.name, quantity="eccentricity", unit="deg", requested=spec.eccentricity_deg,
-                realised=step.realised["eccentricity_deg"], measured=along, estimator_sd=TURN_SD_DEG,
+                realised=step.realised["eccentricity_deg"], measured=along, systematic=5.0 * TURN_SD_DEG,
                 allowed=0.01 * spec.eccentricity_deg, note=note,
             )
         )  # fmt: skip

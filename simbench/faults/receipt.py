@@ -15,12 +15,13 @@ UNVERIFIABLE: Final = "unverifiable"
 
 @dataclass(frozen=True, kw_only=True)
 class Receipt:
-    """requested, realised, measured in `unit`. `estimator_sd`: 1 SD of the measurement about the realised
-    value.
+    """requested, realised, measured in `unit`. The measurement errs about the realised value in two ways: by
+    chance, with `estimator_sd` as 1 SD; and by at most `systematic` in what is not chance (rounding, terms
+    that a model leaves out).
 
-    status is `mismatch` unless |measured - realised| <= 5 SD and |realised - requested| <= allowed; else
-    `unverifiable` when the effect is below `smallest` (what the estimator can detect) or the data allow no
-    estimate (`measured` is None); else `ok`.
+    status is `mismatch` unless |measured - realised| <= smallest and |realised - requested| <= allowed; else
+    `unverifiable` when the effect is below `smallest`, 5 SD + systematic (what the estimator can detect), or
+    the data allow no estimate (`measured` is None); else `ok`.
     """
 
     fault: str
@@ -34,6 +35,7 @@ class Receipt:
     smallest: float
     note: str
     status: Status
+    systematic: float = 0.0
 
 
 def judge(
@@ -44,14 +46,16 @@ def judge(
     requested: float,
     realised: float,
     measured: float | None,
-    estimator_sd: float,
+    estimator_sd: float = 0.0,
     allowed: float,
     note: str = "",
+    systematic: float = 0.0,
 ) -> Receipt:
-    """Fill in the verdict. The smallest detectable effect is 5 SD of the estimator: below it, a fault that
-    was switched off could not be told from one that acts. Numbers that are not finite are a mismatch.
+    """Fill in the verdict. The smallest detectable effect is 5 SD of the estimator and its systematic error:
+    below it, a fault that was switched off could not be told from one that acts. Numbers that are not finite
+    are a mismatch.
     """
-    smallest = 5.0 * float(estimator_sd)
+    smallest = 5.0 * float(estimator_sd) + float(systematic)
     drawn_as_asked = abs(realised - requested) <= allowed
     status: Status
     if not drawn_as_asked or (measured is not None and not abs(measured - realised) <= smallest):
@@ -72,15 +76,16 @@ def judge(
         smallest=smallest,
         note=note,
         status=status,
+        systematic=float(systematic),
     )
 
 
 def untouched(
     *, fault: str, quantity: str, unit: str, found: Sequence[tuple[float, float]], note: str
 ) -> tuple[Receipt, ...]:
-    """What a fault must leave alone: `found` holds (effect, estimator SD) of every sensor that it spares. One
-    receipt about the one that stands out most against its own SD, `ok` within 5 SD of nothing; none where
-    there is no such sensor.
+    """What a fault must leave alone: `found` holds (effect, most SD of the estimator) of every sensor that it
+    spares. One receipt about the one that stands out most against its own SD, `ok` within 5 SD of nothing;
+    none where there is no such sensor.
     """
     if not found:
         return ()

@@ -102,8 +102,9 @@ def road_receipts(
                 unit=unit,
                 requested=float(asked[axis]),
                 realised=float(drawn[axis]),
-                measured=found[axis][0],
-                estimator_sd=float(found[axis][1]),
+                measured=found[axis].value,
+                estimator_sd=found[axis].sd,
+                systematic=found[axis].systematic,
                 allowed=LINEAR_SHARE * float(asked[axis]),
                 note=f"requested: the linearised vehicle on this road; {note}",
             )
@@ -129,7 +130,7 @@ def _missing(spec: RoadShake) -> Receipt:
 def _roughness(spec: RoadShake, realised: Ride, duration_s: float, body: BodyAttitude | None) -> Receipt:
     """Gd by the class, by the drawn road's own table, and by the gyro's pitch against the linearised one."""
     drawn = 1e6 * realised.roughness_m3
-    measured, sd = None, 0.0
+    measured, sd, most = None, 0.0, 0.0
     if body is not None:
         inside = (body.stamp_ns >= 0) & (body.stamp_ns < duration_s * 1e9)
         row = (body.stamp_ns[inside] - realised.start_ns) / realised.step_ns
@@ -139,7 +140,8 @@ def _roughness(spec: RoadShake, realised: Ride, duration_s: float, body: BodyAtt
         if size > 0.0:
             times = gain(body.seen(body.angle_rad[inside][:, 1:2], body.stamp_ns[inside]), expected)
             measured = drawn * times * abs(times)
-            sd = drawn * 2.0 * (LINEAR_SHARE / 5.0 + body.sd_rad / size)
+            sd = drawn * 2.0 * body.gain_sd(expected, body.stamp_ns[inside])
+            most = drawn * 2.0 * LINEAR_SHARE
     return judge(
         fault=ROAD,
         quantity="roughness Gd(0.1 cycles/m)",
@@ -148,6 +150,7 @@ def _roughness(spec: RoadShake, realised: Ride, duration_s: float, body: BodyAtt
         realised=drawn,
         measured=measured,
         estimator_sd=sd,
+        systematic=most,
         allowed=0.1e6 * ROUGHNESS_M3[spec.roughness],  # a class is four times the one before
         note="class, table of the drawn road, pitch by gyro over that of the linearised vehicle, squared",
     )

@@ -103,15 +103,15 @@ def _stale_receipts(spec: StaleFrames, step: Step, site: Site) -> tuple[Receipt,
         result.append(
             judge(
                 fault=spec.name, quantity=f"{name} delay", unit="frames", requested=float(spec.frames),
-                realised=step.realised.get(f"{name} delay", 0.0), measured=measured, estimator_sd=COUNT_SD,
-                allowed=0.0, note=NOTE if ages else "no frame was delivered",
+                realised=step.realised.get(f"{name} delay", 0.0), measured=measured,
+                systematic=5.0 * COUNT_SD, allowed=0.0, note=NOTE if ages else "no frame was delivered",
             )
         )  # fmt: skip
         result.append(
             judge(
                 fault=spec.name, quantity=f"{name} frames without a picture", unit="frames",
                 requested=float(min(spec.frames, many)), realised=float(min(spec.frames, many)),
-                measured=float(lost), estimator_sd=COUNT_SD, allowed=0.0, note="messages counted",
+                measured=float(lost), systematic=5.0 * COUNT_SD, allowed=0.0, note="messages counted",
             )
         )  # fmt: skip
     return (*result, *elsewhere(spec, step, site.rig, ("stamp_ns", "arrival_ns")))
@@ -126,7 +126,7 @@ def _frozen_receipts(spec: Frozen, step: Step, site: Site) -> tuple[Receipt, ...
             judge(
                 fault=spec.name, quantity=f"{name} frozen", unit="%", requested=spec.percent,
                 realised=step.realised.get(f"{name} frozen", 0.0),
-                measured=100.0 * repeats / many if many else None, estimator_sd=COUNT_SD,
+                measured=100.0 * repeats / many if many else None, systematic=5.0 * COUNT_SD,
                 allowed=100.0 * share_allowed(0.01 * spec.percent, many), note=NOTE,
             )
         )  # fmt: skip

@@ -31,7 +31,8 @@ NODES = 33  # sharp pictures over twice the exposure that is asked for: steps of
 PIXELS = 20_000  # those that change most
 LEAST_CHANGE = 2.0 / 255.0  # of a display value over all nodes: less is no streak
 TRIALS = 41  # exposures up to twice the one that is asked for
-MODEL_SD = 0.03  # of the exposure, measured: textures finer than a pixel twinkle from instant to instant
+# Of the exposure, at most (SD 0.03, measured): textures finer than a pixel twinkle from instant to instant.
+MODEL_SHARE = 0.15
 
 Node = Callable[[float], Float32[np.ndarray, "h w c"]]
 
@@ -67,9 +68,9 @@ class Mixtures:
 
 def streak_ms(
     shots: Sequence[Shot], sensor: CameraSensor, camera: PinholeCamera, motion: Motion, about_ms: float
-) -> tuple[float, float] | None:
-    """The exposure of the picture in the middle of a run, sought up to twice `about_ms`, and its SD; None
-    where nothing moves or there is no picture."""
+) -> tuple[float, float, float] | None:
+    """The exposure of the picture in the middle of a run, sought up to twice `about_ms`, its SD by chance and
+    what it may err by besides; None where nothing moves or there is no picture."""
     pictures = [(shot, shot.image.rgb) for shot in shots if shot.image is not None]
     if not pictures:
         return None
@@ -95,7 +96,7 @@ def streak_ms(
     again = fit(develop(known, sensor, stream(0, "streak", shot.truth.sensor)))
     if again is None:
         return None
-    return 2.0 * first[0] - again[0], hypot(first[1], again[1], MODEL_SD * about_ms)
+    return 2.0 * first[0] - again[0], hypot(first[1], again[1]), MODEL_SHARE * about_ms
 
 
 def weights(at_ms: Float64[np.ndarray, " k"], exposure_ms: float) -> Float64[np.ndarray, " k"]:

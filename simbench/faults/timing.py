@@ -75,7 +75,7 @@ def _of_one(
         requested=spec.offset_ms,
         realised=float(np.mean(drawn_ms)),
         measured=None if found_ms is None else float(np.mean(found_ms)),
-        estimator_sd=sd_ms,
+        systematic=5.0 * sd_ms,
         allowed=max(0.01 * abs(spec.offset_ms), 0.1) + 5.0 * spec.jitter_ms / np.sqrt(n),
         note=note,
     )
@@ -90,7 +90,7 @@ def _of_one(
         requested=spec.jitter_ms,
         realised=spread_ms,
         measured=None if found_ms is None else spread_ms * gain(found_ms - found_ms.mean(), about_mean),
-        estimator_sd=sd_ms,
+        systematic=5.0 * sd_ms,
         allowed=5.0 * spec.jitter_ms / np.sqrt(2.0 * n),
         note=note,
     )

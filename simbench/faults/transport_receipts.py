@@ -37,7 +37,7 @@ def _judged(
     drawn = step.realised.get(quantity, 0.0) if realised is None else realised
     return judge(
         fault=spec.name, quantity=quantity, unit=unit, requested=requested, realised=drawn,
-        measured=measured, estimator_sd=sd, allowed=allowed, note=note,
+        measured=measured, systematic=5.0 * sd, allowed=allowed, note=note,
     )  # fmt: skip
 
 

@@ -51,7 +51,7 @@ def receipts(
             fault=spec.name, quantity=f"{name} trigger angle", unit="deg", requested=_wrapped(spec.angle_deg),
             realised=_wrapped(after.trigger_deg[name] - before.trigger_deg[name]),
             measured=None if rate is None else _turned_deg(name, rate, before, captured),
-            estimator_sd=SD_DEG, allowed=max(0.01 * abs(spec.angle_deg), 1e-6),
+            systematic=5.0 * SD_DEG, allowed=max(0.01 * abs(spec.angle_deg), 1e-6),
             note=NOTE if rate is not None else "no sweep has points enough to show how the beam turns",
         )
         for name in struck(spec, before)

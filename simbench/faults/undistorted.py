@@ -60,7 +60,7 @@ def receipts(spec: Undistorted, step: Telling, witness: Witness) -> tuple[Receip
     result = [
         judge(
             fault=spec.name, quantity=f"{name} corner", unit="px", requested=spec.corner_px,
-            realised=step.realised.get(name, 0.0), measured=_farther_px(step, name), estimator_sd=SD_PX,
+            realised=step.realised.get(name, 0.0), measured=_farther_px(step, name), systematic=5.0 * SD_PX,
             allowed=0.01 * abs(spec.corner_px), note=NOTE,
         )
         for name in struck(spec, witness.place)

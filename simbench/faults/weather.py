@@ -98,7 +98,7 @@ def weather_receipts(
     result = [
         judge(
             fault=spec.name, quantity="extinction", unit="1/km", requested=1e3 * alpha,
-            realised=step.realised["extinction"], measured=found, estimator_sd=EXTINCTION_SD_PER_KM,
+            realised=step.realised["extinction"], measured=found, systematic=5.0 * EXTINCTION_SD_PER_KM,
             allowed=10.0 * alpha, note=note if found is not None else f"only {n} points are left",
         ),
         loss(
@@ -119,7 +119,7 @@ def weather_receipts(
                 requested=100.0 * float(in_air.mean()) if len(in_air) else 0.0,
                 realised=step.realised["false"],
                 measured=100.0 * int(np.count_nonzero(new)) / shots if shots else None,
-                estimator_sd=10.0 / max(shots, 1), allowed=mean_limit_percent(in_air),
+                systematic=50.0 / max(shots, 1), allowed=mean_limit_percent(in_air),
                 note="new points on no part of anything",
             )
         )  # fmt: skip

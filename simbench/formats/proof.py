@@ -33,8 +33,8 @@ from simbench.truth import ImageTruth
 
 SECTORS = 720
 LAYER_DEG = 0.08
-LAYERS_SD = 1.5  # per cent: of 120 random losses on three full sweeps, SD 0.8 and bias -0.9
-STALE_SD = 0.05
+LAYERS_SD, LAYERS_OFF = 0.8, 3.5  # per cent: of 120 random losses on three full sweeps, SD 0.8 and bias -0.9
+STALE_FRAMES = 0.25  # a whole number is found
 CLEARLY = 0.5  # the best fit of boxes must be better than this share of the next best
 
 
@@ -130,7 +130,8 @@ def _stale(
         note = "boxes move too little from frame to frame to tell"
     return judge(
         fault=spec.name, quantity=f"{CAMERA} delay", unit="frames", requested=float(spec.frames),
-        realised=float(drawn.stale_frames), measured=measured, estimator_sd=STALE_SD, allowed=0.0, note=note,
+        realised=float(drawn.stale_frames), measured=measured, systematic=STALE_FRAMES, allowed=0.0,
+        note=note,
     )  # fmt: skip
 
 
@@ -144,7 +145,7 @@ def _lost(
     before, after = layers(first_sweep_m), layers(scan.xyz_m)
     return judge(
         fault=spec.name, quantity="rings", unit="%", requested=spec.percent, realised=drawn.lost_percent,
-        measured=100.0 * (1.0 - after / before), estimator_sd=LAYERS_SD,
+        measured=100.0 * (1.0 - after / before), estimator_sd=LAYERS_SD, systematic=LAYERS_OFF,
         allowed=100.0 / max(drawn.rings, 1), note="layers of elevation in narrow sectors, first sweep",
     )  # fmt: skip
 

@@ -1,7 +1,8 @@
 """The proof of one fault: honest draws match, every mutant is caught, and a higher severity is more.
 
-z of a receipt: (measured - realised) / the SD that its estimator is said to have. An estimator that counts or
-reads off what it measures errs by rounding only: such a receipt is `exact`.
+z of a receipt: (measured - realised) / the SD that its estimator is said to have by chance. One that counts
+or reads off what it measures errs by rounding only, and says an SD of 0: it is `exact`. One of which a bound
+on what is not chance is more than five SD is `bounded`: its errors lie within that, or it is a mismatch.
 """
 
 from __future__ import annotations
@@ -24,9 +25,9 @@ from simbench.proving.places import Proving, place_where
 from simbench.proving.same import same
 
 LEVEL = 4  # at which mutants are tried and honest draws made
-EXACT_Z = 0.02  # an estimator whose errors scatter by less than this share of its SD does not err by chance
 FEW = 10  # draws of a mutant or of a severity, where one does not tell
-MOST_Z_SD, MOST_Z_MEAN = 1.25, 0.2
+BOUNDED = 5.0  # SD, beyond which what is not chance hides the chance
+OFF_Z_SD, OFF_Z_MEAN = 0.2, 0.2  # from 1 and from 0, with any number of draws
 CAUGHT, CRASHED, MISSED, SAME = "caught", "crashed", "missed", "same"
 
 
@@ -41,10 +42,29 @@ class Tried:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Scatter:
+    """z of one quantity over n honest draws."""
+
+    quantity: str
+    n: int
+    mean: float
+    sd: float
+
+    @property
+    def holds(self) -> bool:
+        """The mean is 0 and the SD is 1, within a fifth or 5 SD of what so many draws give: an estimator is
+        neither worse nor better than it says."""
+        apart = max(OFF_Z_MEAN, 5.0 * self.sd / np.sqrt(self.n))
+        off = max(OFF_Z_SD, 5.0 / np.sqrt(2.0 * self.n))
+        return bool(abs(self.mean) <= apart and abs(self.sd - 1.0) <= off)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Proof:
-    """Of one fault. z_mean, z_sd: of all honest receipts with an estimator that errs by chance; None where
-    all are exact. bad: honest receipts that did not match. off_draw: quantities that are drawn otherwise than
-    asked for. rises: None where a fault has no severities."""
+    """Of one fault. errs: z of every quantity whose estimator errs by chance; bounded: how many others err by
+    a bound that is not chance. z_mean, z_sd: of all z together; None where none errs by chance. bad: honest
+    receipts that did not match. off_draw: quantities that are drawn otherwise than asked for. rises: None
+    where a fault has no severities."""
 
     fault: str
     tried: tuple[Tried, ...]
@@ -53,9 +73,8 @@ class Proof:
     verified: int
     bad: int
     off_draw: tuple[str, ...]
-    z_mean: float | None
-    z_sd: float | None
-    z_n: int
+    errs: tuple[Scatter, ...]
+    bounded: int
     effects: tuple[float | None, ...]
     rises: bool | None
 
@@ -64,13 +83,25 @@ class Proof:
         return tuple(f"{t.kind}: {t.name}" for t in self.tried if t.outcome == MISSED)
 
     @property
+    def z_n(self) -> int:
+        return sum(one.n for one in self.errs)
+
+    @property
+    def z_mean(self) -> float | None:
+        return sum(one.n * one.mean for one in self.errs) / self.z_n if self.errs else None
+
+    @property
+    def z_sd(self) -> float | None:
+        """About the mean of all."""
+        if (mean := self.z_mean) is None:
+            return None
+        square = sum(one.n * (one.sd**2 + (one.mean - mean) ** 2) for one in self.errs) / self.z_n
+        return float(np.sqrt(square))
+
+    @property
     def z_holds(self) -> bool:
-        """The mean is 0 (within 5 SD of a mean, or a fifth of the SD that is published), and the SD is that
-        which the receipts publish or less: an estimator may be better than it says, never worse."""
-        if self.z_mean is None or self.z_sd is None:
-            return True
-        apart = max(5.0 * self.z_sd / np.sqrt(self.z_n), MOST_Z_MEAN)
-        return abs(self.z_mean) <= apart and self.z_sd <= MOST_Z_SD
+        """Of every quantity by itself: two that are wrong in opposite ways are not right together."""
+        return all(one.holds for one in self.errs)
 
     @property
     def bad_by_chance(self) -> int:
@@ -134,7 +165,7 @@ def trials(fault: str) -> Trials:
 def proof_of(fault: str, made: Trials, honest: Sequence[Drawn]) -> Proof:
     """The proof from its parts."""
     found = [receipt for drawn in honest for receipt in drawn]
-    z = _zs(found)
+    errs, bounded = scatters(found)
     return Proof(
         fault=fault,
         tried=made.tried,
@@ -143,9 +174,8 @@ def proof_of(fault: str, made: Trials, honest: Sequence[Drawn]) -> Proof:
         verified=sum(r.status == OK and r.requested != 0.0 for r in found),
         bad=sum(r.status == MISMATCH for r in found),
         off_draw=tuple(sorted(q for q in _off_draw(honest) if _varies(honest, q))),
-        z_mean=float(z.mean()) if len(z) else None,
-        z_sd=float(z.std()) if len(z) else None,
-        z_n=len(z),
+        errs=errs,
+        bounded=bounded,
         effects=made.effects,
         rises=made.rises,
     )
@@ -232,16 +262,24 @@ def _varies(found: Sequence[Iterable[Receipt]], quantity: str) -> bool:
     return len({r.realised for drawn in found for r in drawn if r.quantity == quantity}) > 1
 
 
-def _zs(found: Iterable[Receipt]) -> np.ndarray:
-    """Of all quantities whose estimator errs by chance. An error that is the same in every draw (the gap
-    between two frames, say) is within its SDs or a mismatch; what a fault must leave alone is told of the
-    worst sensor only."""
-    by_quantity: dict[str, list[float]] = defaultdict(list)
+def scatters(found: Iterable[Receipt]) -> tuple[tuple[Scatter, ...], int]:
+    """z of all quantities whose estimator errs by chance, and how many quantities are bounded. What a fault
+    must leave alone is told of the worst sensor only and has no z."""
+    by_quantity: dict[str, list[Receipt]] = defaultdict(list)
     for r in found:
         if r.measured is not None and (r.requested, r.realised, r.allowed) != (0.0, 0.0, 0.0):
-            by_quantity[r.quantity].append((r.measured - r.realised) / r.estimator_sd)
-    errs = [z for z in by_quantity.values() if np.std(z) > EXACT_Z]
-    return np.concatenate([np.array(z) for z in errs]) if errs else np.zeros(0)
+            by_quantity[r.quantity].append(r)
+    errs, bounded = list[Scatter](), 0
+    for quantity, rows in by_quantity.items():
+        sd = np.array([r.estimator_sd for r in rows])
+        most = np.array([r.systematic for r in rows])
+        if not sd.all() or np.median(most / sd) > BOUNDED:
+            bounded += bool(sd.any())
+            continue
+        z = np.array([float(r.measured or 0.0) - r.realised for r in rows]) / sd
+        spread = float(z.std(ddof=1)) if len(z) > 1 else 1.0  # one draw does not scatter
+        errs.append(Scatter(quantity=quantity, n=len(z), mean=float(z.mean()), sd=spread))
+    return tuple(errs), bounded
 
 
 def _effects(place: Proving, levels: Sequence[FaultSpec], draws: int) -> tuple[float | None, ...]:

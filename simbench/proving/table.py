@@ -36,22 +36,26 @@ def failures(proof: Proof) -> Iterator[str]:
         yield f"'{quantity}' is on average not drawn as asked for"
     if proof.rises is False:
         yield f"a higher severity is not more: {', '.join(map(_number, proof.effects))}"
-    if not proof.z_holds:
-        yield f"the estimator errs otherwise than it says: z has mean {proof.z_mean:.2f}, SD {proof.z_sd:.2f}"
+    for one in proof.errs:
+        if not one.holds:
+            yield (
+                f"the estimator of '{one.quantity}' errs otherwise than it says: z has mean {one.mean:.2f}, "
+                f"SD {one.sd:.2f} over {one.n} draws"
+            )
 
 
 def _row(proof: Proof) -> tuple[str, ...]:
     asked = len(proof.tried) - _same(proof)
     crashed = sum(tried.outcome == CRASHED for tried in proof.tried)
     seen = f"{asked - len(proof.missed)} of {asked}" + (f" ({crashed} crash)" if crashed else "")
-    exact = proof.z_mean is None or proof.z_sd is None
+    otherwise = "bounded" if proof.bounded else "exact"
     return (
         proof.fault,
         seen,
         f"{proof.draws}, {proof.bad} bad",
         f"{proof.verified} of {proof.receipts}",
-        "exact" if exact else f"{proof.z_mean:+.3f}",
-        "exact" if exact else f"{proof.z_sd:.2f}",
+        otherwise if proof.z_mean is None else f"{proof.z_mean:+.3f}",
+        otherwise if proof.z_sd is None else f"{proof.z_sd:.2f}",
         {True: "rise", False: "DO NOT RISE", None: "words"}[proof.rises],
     )
 

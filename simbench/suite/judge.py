@@ -20,7 +20,7 @@ from simbench.suite.side import Ran, Runs, Side
 from simbench.verdict.decide import ALPHA, Judgement, judge
 from simbench.verdict.overall import suite_verdict
 from simbench.verdict.rare import judge_failures
-from simbench.verdict.sequential import LEVELS, Look, decide_at
+from simbench.verdict.sequential import LEVELS, decide_at
 
 Key = tuple[str, str]
 """Group and metric."""
@@ -33,7 +33,7 @@ class Asked:
     scenarios changed. look: of a sequential test, None: one fixed look."""
 
     changed: bool = False
-    look: Look | None = None
+    look: int | None = None
 
 
 def answer(
@@ -63,7 +63,7 @@ def answer(
 
 
 def compared(
-    new: Side, old: Side, look: Look | None = None, groups: Collection[str] | None = None
+    new: Side, old: Side, look: int | None = None, groups: Collection[str] | None = None
 ) -> dict[Key, Judgement]:
     """All metrics of the groups that both sides have (of these only: `groups`), adjusted to one another.
     look: of a sequential test."""
@@ -207,7 +207,7 @@ def _identical(old: Runs, new: Runs) -> bool:
     return outputs(old.runs) == outputs(new.runs) and all(run.outputs for run in new.runs.values())
 
 
-def _alpha(look: Look | None) -> float:
+def _alpha(look: int | None) -> float:
     return ALPHA if look is None else LEVELS[look]
 
 

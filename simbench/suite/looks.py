@@ -12,7 +12,7 @@ from simbench.suite.judge import Key, compared
 from simbench.suite.plan import Group
 from simbench.suite.side import Side
 from simbench.verdict.decide import Judgement
-from simbench.verdict.sequential import LOOKS, Look
+from simbench.verdict.sequential import LOOKS
 
 Measure = Callable[[Sequence[tuple[Group, int]]], Side]
 """Runs cases that were not run yet; the side of all cases so far."""
@@ -20,7 +20,7 @@ Measure = Callable[[Sequence[tuple[Group, int]]], Side]
 
 def until_decided(
     groups: Sequence[Group], old: Side, measure: Measure
-) -> tuple[Side, dict[Key, Judgement], Look]:
+) -> tuple[Side, dict[Key, Judgement], int]:
     """The side of all that was run, every judgement, and the last look. BadInput: the baseline has fewer runs
     of a group than the first look takes."""
     seeds = {group.name: _shared(group, old) for group in groups}

@@ -27,7 +27,7 @@ from jaxtyping import Bool, Float64
 from scipy.special import stdtr
 
 from scenarios.seeding import stream
-from simbench.campaign import each_of
+from simbench.campaign.jobs import each_of
 from simbench.score.statistics import BOOTSTRAP_RUNS
 from simbench.verdict.bounds import candidates, draw_counts
 from simbench.verdict.decide import ALPHA

@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float64
 
-from simbench.verdict.differences import Better, differences
+from simbench.verdict.differences import Values, differences
 
 DATA = Path(__file__).with_name("data") / "verdict_runs.json"
 MADE_BY = [line.strip().rstrip(" \\") for line in (__doc__ or "").splitlines() if line.startswith("    ")]
@@ -75,7 +75,7 @@ def record(run: Path, to: Path = DATA) -> None:
 def recorded(metric: str, old: str, new: str) -> Float64[np.ndarray, " n"]:
     """Differences new - old of the recorded runs, higher is better."""
     values = json.loads(DATA.read_text(encoding="utf-8"))["values"][metric]
-    sides = [dict(enumerate(values[name])) for name in (old, new)]
+    sides: list[Values] = [dict(enumerate(values[name])) for name in (old, new)]
     return differences(sides[0], sides[1], METRICS[metric]).d
 
 

@@ -319,8 +319,13 @@ def test_what_is_measured_lies_about_what_was_drawn_as_the_receipts_say(which: s
     for seed in range(8):
         for receipt in proof(spec, act(spec, seed=seed))[: len(site().rig.cameras)]:
             assert receipt.measured is not None
-            scores.append((receipt.measured - receipt.realised) / receipt.estimator_sd)
-    assert abs(np.mean(scores)) < 1.0 and np.std(scores) < 1.3 and np.abs(scores).max() < 4.0
+            error = receipt.measured - receipt.realised
+            if receipt.estimator_sd == 0.0:  # rounding only
+                assert abs(error) <= receipt.systematic, receipt
+            else:
+                scores.append(error / receipt.estimator_sd)
+    if scores:
+        assert abs(np.mean(scores)) < 0.6 and 0.6 < np.std(scores) < 1.4 and np.abs(scores).max() < 4.5
 
 
 # -- with others ------------------------------------------------------------------------------------------

@@ -9,6 +9,8 @@ from unittest import mock
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from scenarios.faults import CalibrationRotation, EdgeError, FaultSpec, Flex, TriggerOffset, Vibration
 from simbench.capture import Drawn
@@ -71,7 +73,7 @@ def test_a_clean_draw_is_ok(which: str) -> None:
     for receipt in found:
         assert receipt.fault == SPECS[which].name
         assert receipt.unit and receipt.note
-        assert receipt.smallest == pytest.approx(5.0 * receipt.estimator_sd)
+        assert receipt.smallest == pytest.approx(5.0 * receipt.estimator_sd + receipt.systematic)
 
 
 @pytest.mark.parametrize(("system", "seed"), [("car", 0), ("wearable", 1)])
@@ -338,11 +340,69 @@ def test_a_verdict_needs_all_of_it() -> None:
     assert verdict(10.0, 10.0, nan) == verdict(10.0, nan, 10.0) == verdict(10.0, nan, None) == MISMATCH
 
 
+ERRORS = st.floats(0.0, 1e3)
+NUMBERS = st.floats(-1e4, 1e4)
+
+
+def judged(realised: float, measured: float, sd: float, systematic: float) -> Receipt:
+    """What was asked for was drawn."""
+    return judge(
+        fault="f", quantity="q", unit="u", requested=realised, realised=realised, measured=measured,
+        estimator_sd=sd, allowed=0.0, systematic=systematic,
+    )  # fmt: skip
+
+
+@given(realised=NUMBERS, measured=NUMBERS, sd=ERRORS, systematic=ERRORS)
+def test_the_smallest_effect_is_five_sd_and_what_is_not_chance(
+    realised: float, measured: float, sd: float, systematic: float
+) -> None:
+    receipt = judged(realised, measured, sd, systematic)
+    assert receipt.smallest == 5.0 * sd + systematic
+    assert (receipt.status == MISMATCH) == (abs(measured - realised) > receipt.smallest)
+    if receipt.status == OK:
+        assert abs(realised) > receipt.smallest
+
+
+@given(realised=NUMBERS, measured=NUMBERS, sd=ERRORS, systematic=ERRORS, more=ERRORS)
+def test_who_may_err_more_contradicts_less_and_verifies_less(
+    realised: float, measured: float, sd: float, systematic: float, more: float
+) -> None:
+    tight = judged(realised, measured, sd, systematic)
+    for loose in (
+        judged(realised, measured, sd, systematic + more),
+        judged(realised, measured, sd + more, systematic),
+    ):
+        assert loose.smallest >= tight.smallest
+        assert tight.status == MISMATCH or loose.status != MISMATCH
+        assert tight.status != UNVERIFIABLE or loose.status == UNVERIFIABLE
+
+
+@pytest.mark.parametrize(
+    ("measured", "sd", "systematic", "status"),
+    [
+        (10.5, 0.1, 0.0, OK),  # 5 SD
+        (10.6, 0.1, 0.0, MISMATCH),  # 6 SD
+        (10.6, 0.1, 0.2, OK),  # 5 SD and 0.1 of 0.2
+        (10.8, 0.1, 0.2, MISMATCH),  # 0.7 is allowed
+        (10.2, 0.0, 0.25, OK),
+        (10.3, 0.0, 0.25, MISMATCH),
+        (10.0, 0.0, 0.0, OK),
+        (10.0, 0.0, 10.0, UNVERIFIABLE),  # off could not be told from on
+        (10.0, 1.0, 5.0, UNVERIFIABLE),
+    ],
+)
+def test_a_measurement_matches_within_five_sd_and_what_is_not_chance(
+    measured: float, sd: float, systematic: float, status: str
+) -> None:
+    assert judged(10.0, measured, sd, systematic).status == status
+
+
 # -- the published errors of the estimators ----------------------------------------------------------------
 
 
 def test_measured_minus_realised_is_within_the_published_errors() -> None:
-    """Over 30 draws the z-scores of every kind of receipt have a mean near 0 and an SD of at most 1."""
+    """Over 30 draws the z-scores of every kind of receipt that errs by chance have a mean near 0 and an SD
+    near 1; what errs otherwise stays within its bound."""
     specs = (
         TriggerOffset(offset_ms=50.0, jitter_ms=10.0),
         Vibration(rms_deg=1.0),
@@ -354,14 +414,19 @@ def test_measured_minus_realised_is_within_the_published_errors() -> None:
         at = staged("car" if seed % 5 == 0 else "wearable", seed, specs=specs)
         for receipt in proof(at, seed):
             assert receipt.measured is not None and receipt.status != MISMATCH, receipt
-            kind = receipt.quantity.split(" ", 1)[receipt.quantity.startswith("cam-")]
+            kind = (
+                receipt.quantity.split(" ", 1)[1] if receipt.quantity.startswith("cam-") else receipt.quantity
+            )
             error = receipt.measured - receipt.realised
+            if receipt.systematic > 5.0 * receipt.estimator_sd:
+                assert abs(error) <= receipt.systematic + 5.0 * receipt.estimator_sd, receipt
+                continue
             z[(receipt.fault, kind)].append(error / receipt.estimator_sd)
-    assert len(z) == 8
+    assert {(Vibration.name, axis) for axis in ("roll RMS", "pitch RMS", "yaw RMS")} <= set(z)
     for kind, scores in z.items():
         assert len(scores) >= 30
-        assert abs(np.mean(scores)) < 0.4, (kind, np.mean(scores))
-        assert np.std(scores) <= 1.0, (kind, np.std(scores))
+        assert abs(np.mean(scores)) < 5.0 / np.sqrt(len(scores)), (kind, np.mean(scores))
+        assert 0.5 < np.std(scores) < 1.5, (kind, np.std(scores))
 
 
 @pytest.mark.parametrize(

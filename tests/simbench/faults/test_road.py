@@ -171,10 +171,14 @@ def test_measured_less_realised_is_within_the_published_errors() -> None:
         at = staged(system, seed, specs=(RoadShake(roughness="B"),), duration_s=2.0)
         for receipt in receipts_of(posed(at, seed), at):
             assert receipt.measured is not None and receipt.status != MISMATCH, receipt
-            z[receipt.quantity].append((receipt.measured - receipt.realised) / receipt.estimator_sd)
-    assert len(z) == 4
+            error = receipt.measured - receipt.realised
+            if receipt.systematic > 5.0 * receipt.estimator_sd:
+                assert abs(error) <= receipt.systematic, receipt
+                continue
+            z[receipt.quantity].append(error / receipt.estimator_sd)
+    assert set(z) == {"roll RMS", "pitch RMS"}  # by the gyro, whose noise is known
     for quantity, scores in z.items():
-        assert np.sqrt(np.mean(np.square(scores))) < 1.2, (quantity, scores)
+        assert 0.4 < np.sqrt(np.mean(np.square(scores))) < 1.8, (quantity, scores)
 
 
 @pytest.mark.parametrize("system", ["car", "wearable"])

@@ -8,15 +8,17 @@ from unittest import mock
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.stats import norm
 
 from scenarios.faults import FAULTS, ClockOffset, FaultSpec
 from scenarios.severity import severe
 from simbench.cli import main
 from simbench.faults import transport
 from simbench.faults.fault import Acted
+from simbench.faults.receipt import Receipt, judge
 from simbench.proving import places
 from simbench.proving.mutants import by, mutants, signed
-from simbench.proving.prove import Proof, levels_of, prove
+from simbench.proving.prove import Proof, levels_of, prove, scatters
 from simbench.proving.same import same
 from simbench.proving.table import failures, lines
 
@@ -113,6 +115,88 @@ def test_same_compares_to_the_byte() -> None:
     assert not same(one, {"a": (np.array([1.0, 0.0]), 3)})
     assert not same(one, {"a": (np.array([1.0, -0.0], dtype=np.float32), 3)})
     assert not same(one, {"b": (np.array([1.0, -0.0]), 3)}) and not same((1,), (1, 2)) and not same(1, 1.0)
+
+
+# -- what an estimator says of itself ---------------------------------------------------------------------
+
+
+def receipts_of(errors: np.ndarray, sd: float, systematic: float = 0.0, quantity: str = "q") -> list[Receipt]:
+    return [
+        judge(
+            fault="f", quantity=quantity, unit="u", requested=10.0, realised=10.0, measured=10.0 + float(e),
+            estimator_sd=sd, systematic=systematic, allowed=0.1,
+        )
+        for e in errors
+    ]  # fmt: skip
+
+
+def scattered(z_sd: float, n: int, z_mean: float = 0.0) -> np.ndarray:
+    """Errors of SD 1 as they fall, times z_sd."""
+    return z_mean + z_sd * norm.ppf((np.arange(n) + 0.5) / n)
+
+
+@pytest.mark.parametrize(
+    ("z_sd", "z_mean", "n", "holds"),
+    [
+        (1.0, 0.0, 100, True),
+        (0.3, 0.0, 100, False),  # better than it says
+        (1.6, 0.0, 100, False),
+        (1.25, 0.0, 100, True),  # within 5 / sqrt(200) = 0.35
+        (1.25, 0.0, 5000, False),
+        (0.75, 0.0, 5000, False),
+        (1.15, 0.15, 5000, True),
+        (1.0, 0.3, 5000, False),
+        (1.0, 0.3, 100, True),  # within 5 / sqrt(100) = 0.5
+        (1.0, 0.6, 100, False),
+        (0.0, 0.0, 100, False),  # exact, and says otherwise
+        (0.3, 0.0, 10, True),  # ten draws tell nothing
+    ],
+)
+def test_z_has_mean_0_and_sd_1_or_the_estimator_is_not_what_it_says(
+    z_sd: float, z_mean: float, n: int, holds: bool
+) -> None:
+    (found,), bounded = scatters(receipts_of(0.2 * scattered(z_sd, n, z_mean), sd=0.2))
+    assert not bounded and found.n == n
+    assert found.mean == pytest.approx(z_mean, abs=1e-9) and found.sd == pytest.approx(z_sd, rel=0.05)
+    assert found.holds is holds
+
+
+def test_two_quantities_that_are_wrong_in_opposite_ways_are_not_right_together() -> None:
+    both = [
+        *receipts_of(scattered(0.4, 200), 1.0, quantity="a"),
+        *receipts_of(scattered(1.36, 200), 1.0, quantity="b"),
+    ]
+    proof = replace(A_PROOF, errs=scatters(both)[0])
+    assert proof.z_sd == pytest.approx(1.0, abs=0.02) and not proof.z_holds and not proof.good
+    said = list(failures(proof))
+    assert len(said) == 2 and "the estimator of 'a' errs otherwise than it says" in said[0]
+
+
+@pytest.mark.parametrize(
+    ("sd", "systematic", "word"), [(0.0, 0.0, "exact"), (0.0, 0.3, "exact"), (0.1, 0.6, "bounded")]
+)
+def test_what_does_not_err_by_chance_has_no_z(sd: float, systematic: float, word: str) -> None:
+    errs, bounded = scatters(receipts_of(np.zeros(50), sd, systematic))
+    proof = replace(A_PROOF, errs=errs, bounded=bounded)
+    assert not errs and proof.z_mean is None and proof.z_holds
+    assert f"{word}  {word}" in " ".join(lines((proof,))).replace("   ", "  ")
+
+
+def test_a_bound_of_less_than_five_sd_does_not_excuse_from_z() -> None:
+    (found,), _ = scatters(receipts_of(scattered(0.3, 100), 1.0, systematic=4.0))
+    assert not found.holds
+
+
+def test_the_table_prints_the_mean_and_the_sd_of_z() -> None:
+    errs, _ = scatters(receipts_of(scattered(1.1, 400, z_mean=0.12), 1.0))
+    row = list(lines((replace(A_PROOF, errs=errs),)))[1]
+    assert "+0.120  1.10" in row
+
+
+A_PROOF = Proof(
+    fault="f", tried=(), draws=100, receipts=100, verified=100, bad=0, off_draw=(), errs=(), bounded=0,
+    effects=(), rises=None,
+)  # fmt: skip
 
 
 # -- the command ------------------------------------------------------------------------------------------
