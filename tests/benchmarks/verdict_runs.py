@@ -20,7 +20,7 @@ from typing import TypeAlias
 import numpy as np
 from jaxtyping import Float64
 
-from simbench.verdict.differences import Values, differences
+from simbench.verdict.differences import Better, Values, differences
 
 DATA = Path(__file__).with_name("data") / "verdict_runs.json"
 MADE_BY = [line.strip().rstrip(" \\") for line in (__doc__ or "").splitlines() if line.startswith("    ")]
