@@ -51,6 +51,7 @@ class Cluster(Executor):
             settings = {
                 "distributed.comm.timeouts.connect": f"{ANSWER_S}s",
                 "distributed.scheduler.allowed-failures": 0,  # who died how often is counted in `run.py`
+                "distributed.admin.low-level-log-length": 1000,  # memory that does not grow with the tasks
             }
             stack.enter_context(dask.config.set(settings))
             if address == LOCAL:
