@@ -36,7 +36,9 @@ def pytest_collection_modifyitems(
 ) -> None:
     """Add the tests of the suites to what was collected."""
     for target in config.getoption("--simbench-suite"):
-        collector = SuiteCollector.from_parent(session, name=Path(target).name, target=target)
+        collector = SuiteCollector.from_parent(
+            session, name=Path(target).name, nodeid=Path(target).name, target=target
+        )
         items.extend(item for item in collector.collect())
 
 
