@@ -167,7 +167,7 @@ OFFSET, NONE = "timing.trigger_offset_ms", ("--images", "none")
 BAD_WORDS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "scenario": (("overtake-aproach",), ("did you mean 'overtake-approach'?",)),
     "pipeline": (("overtake-approach", "--pipeline", "probabilistc"), ("did you mean 'probabilistic'?",)),
-    "pipeline file": (("overtake-approach", "--pipeline", "mine.py:Mine"), ("no file mine.py",)),
+    "pipeline file": (("overtake-approach", "--pipeline", "mine.py:Mine"), ("there is no file", "mine.py")),
     "fault": (("overtake-approach", "--faults", "timing.triger_offset_ms=5"), (f"did you mean '{OFFSET}'?",)),
     "fault set": (("overtake-approach", "--faults", "dem"), ("did you mean 'demo'?",)),
     "field of a fault": (("overtake-approach", "--faults", "motion.flex_deg={rms: 1}"), ("'rms_deg'",)),

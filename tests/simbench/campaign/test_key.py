@@ -15,13 +15,14 @@ from simbench.campaign import job_key as job_keys
 from simbench.campaign.job_key import job_key, pipeline_digest
 from simbench.campaign.key import code_digest, files_of, sha256_of, task_key
 from simbench.case import Job
+from simbench.isolate.limits import Limits
 
 JOB = Job(scenario="overtake-approach", system="car", seed=0, pipelines=("robust",))
 OTHER: dict[str, Any] = {
     "scenario": "overtake-recede", "system": "wearable", "seed": 1, "pipelines": ("probabilistic",),
     "faults": ("none",), "images": "raycast", "size_px": (96, 64), "boxes": "labels", "frames": (0, 3),
     "changes": ("systems.car.duration_s=3",), "calibration": "found", "off": ("bench.spin_phase",),
-    "found_in": "nowhere.yaml",
+    "found_in": "nowhere.yaml", "isolate": "all", "limits": Limits(message_s=1.0),
 }  # fmt: skip
 
 

@@ -271,7 +271,8 @@ PROGRAMS = {
     "begin(); say('error', ask()['id'], why='out of\\n paper')": "out of paper",
     "begin(); say('error', ask()['id'], why=['x'])": "it answered with an error and no reason",
     "begin(); ask(); sys.stdout.close(); os.close(1); time.sleep(60)": "closed its output before it answered",
-    "begin(); os.close(0); time.sleep(60)": "closed its input before it had read all of",
+    "say('description', ask()['id'], protocol='simbench-pipeline/1'); reset = ask()['id']; os.close(0); "
+    "say('ready', reset); time.sleep(60)": "closed its input before it had read all of",
     "begin(); os.close(1); os.kill(os.getpid(), signal.SIGBUS)": "was ended by SIGBUS",
     "say('description', ask()['id'], protocol='other/2')": "it speaks 'other/2', not simbench-pipeline/1",
     "say('description', ask()['id'], protocol='simbench-pipeline/1', reads_images=3)": "'reads_images' is",
