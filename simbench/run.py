@@ -129,7 +129,7 @@ def judge(
     curves = distances(made.recording, driven, others)
     clock.lap("oracle and views")
     bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
-    return tuple(_spoiled(case, bad) if bad else case for case in cases), views, curves
+    return tuple(spoiled(case, bad) if bad else case for case in cases), views, curves
 
 
 @runtime_checkable
@@ -171,7 +171,7 @@ def _driven_apart(name: str, recording: Recording, limits: Limits) -> Driven | C
         return failed(name, "pipeline_error", str(error))
 
 
-def _spoiled(case: Case, bad: list[Receipt]) -> Case:
+def spoiled(case: Case, bad: list[Receipt]) -> Case:
     """A receipt that does not match makes every number of the recording void."""
     names = ", ".join(f"{r.fault} {r.quantity}" for r in bad)
     return failed(case.pipeline, "receipt_mismatch", f"receipt does not match: {names}")

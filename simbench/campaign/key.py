@@ -41,9 +41,12 @@ def _folder_of(package: str) -> Path:
     return Path(next(iter(spec.submodule_search_locations)))
 
 
-def files_of(folder: Path, suffixes: tuple[str, ...]) -> Iterable[bytes]:
-    """Name and content of all files of some kinds, in the order of their names."""
+def files_of(folder: Path, suffixes: tuple[str, ...], besides: str = "") -> Iterable[bytes]:
+    """Name and content of all files of some kinds, in the order of their names. besides: a folder of it that
+    is left out."""
     for path in sorted(path for path in folder.rglob("*") if path.suffix in suffixes and path.is_file()):
+        if path.is_relative_to(folder / besides) and besides:
+            continue
         yield f"{folder.name}/{path.relative_to(folder).as_posix()}".encode()
         yield path.read_bytes()
 

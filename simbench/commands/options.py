@@ -123,17 +123,7 @@ def of_suites(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def with_them(*args: Any, **more: Any) -> None:
-        names = (
-            "words",
-            "tags",
-            "last_failed",
-            "resume",
-            "against",
-            "allow_changed",
-            "until_decided",
-            "cluster",
-        )
-        command(*args, suite={name: more.pop(name) for name in names}, **more)
+        command(*args, suite={name: more.pop(name) for name in OF_SUITES}, **more)
 
     wrapped: Callable[..., None] = with_them
     for option in reversed(options):

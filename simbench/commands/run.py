@@ -172,8 +172,14 @@ FOR_SCENARIOS = (
 
 def _is_suite(targets: tuple[str, ...], suite: dict[str, Any]) -> bool:
     """Whether a suite is meant. UsageError: a mixture."""
-    from scenarios.suite import is_suite
+    from scenarios.errors import Where
+    from scenarios.load import list_scenarios
+    from scenarios.suite import is_suite, list_suites
 
+    known = (*list_scenarios(), *list_suites())
+    for target in targets:
+        if target and not set(target) & set("/.:") and target not in known:
+            raise Where(file=None).unknown("scenario or suite", target, known)
     suites = [target for target in targets if is_suite(target)]
     if suites and len(targets) > 1:
         raise click.UsageError("one suite at a time, and nothing beside it")

@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from simbench import results as result_files
-from simbench.case import Case, Job, JobResult, failed, scored
+from simbench.case import Case, Job, JobResult, scored
 from simbench.drive import Driven
 from simbench.elsewhere.messages import messages_as_bytes
 from simbench.elsewhere.outputs import read_outputs
@@ -17,7 +17,7 @@ from simbench.environment import environment
 from simbench.faults.receipt import MISMATCH
 from simbench.files import prepare_folder, write_bytes, write_text
 from simbench.outcome import exit_code
-from simbench.run import Made, recording_of
+from simbench.run import Made, recording_of, spoiled
 from simbench.score.objects import score_objects
 
 MESSAGES = "messages.sbf"
@@ -51,10 +51,9 @@ def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[dic
 def _case(results: Path, made: Made) -> Case:
     outputs, trajectories = read_outputs(results, made.recording)
     bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
-    if bad:
-        return failed(results.name, "receipt_mismatch", f"receipt does not match: {bad[0].fault}")
     driven = Driven(outputs=outputs, trajectories=trajectories, scan_ms=(), step_ns={})
-    return scored(results.name, score_objects(made.recording, outputs, trajectories), driven)
+    case = scored(results.name, score_objects(made.recording, outputs, trajectories), driven)
+    return spoiled(case, bad) if bad else case
 
 
 def print_rows(content: dict[str, Any]) -> None:

@@ -19,6 +19,7 @@ LOOK = {
     "REGRESSION": (palette.WRONG, "X"),
     "ERROR": (palette.INK, "D"),
 }
+MOST_LETTERS = 30  # of a line of a title
 MOST_MARGINS = 6.0  # what lies farther out is drawn at the edge
 
 
@@ -52,34 +53,40 @@ def _within(value: float) -> float:
 
 
 def old_and_new(gates: Sequence[Gate], old: Side | None, new: Side) -> Markup:
-    """Every run of some groups: its value old, joined by a line to its value new."""
+    """Every run of some groups: its value old, where there is one, joined by a line to its value new."""
 
     def draw(figure: Any) -> None:
         plots = figure.subplots(1, len(gates), squeeze=False)[0]
         for plot, gate in zip(plots, gates, strict=True):
             earlier = old.groups.get(gate.group) if old is not None else None
             for seed, run in new.groups[gate.group].runs.items():
-                after = run.values.get(gate.metric)
                 then = earlier.runs.get(seed) if earlier is not None else None
-                before = then.values.get(gate.metric) if then is not None else None
-                if before is not None and after is not None:
-                    plot.plot([0, 1], [before, after], color=palette.RULE, lw=0.9, zorder=1)
-                for x, value, colour in ((0, before, palette.MUTED), (1, after, palette.METHOD)):
-                    if value is not None:
-                        plot.plot([x], [value], "o", color=colour, ms=4, alpha=0.8, zorder=2)
+                _run(plot, then.values.get(gate.metric) if then else None, run.values.get(gate.metric))
             if gate.limit is not None:
                 plot.axhline(gate.limit, color=palette.WRONG, lw=1.2, ls="--")
             for x, mean in ((0, gate.old), (1, gate.new)):
                 if mean is not None:
                     plot.plot([x - 0.22, x + 0.22], [mean, mean], color=palette.INK, lw=2.0, zorder=3)
-            plot.set(xlim=(-0.5, 1.5), title=_title(gate))
-            plot.set_xticks([0, 1], ["old", "new"])
-            plot.title.set_fontsize(8)
+            places = (0, 1) if old is not None else (1,)
+            plot.set_xlim(places[0] - 0.5, 1.5)
+            plot.set_xticks(places, ("old", "new")[-len(places) :])
+            unit = f" ({gate.unit})" if gate.unit not in ("", "1") else ""
+            plot.set_title(_title(gate), fontsize=7.5, loc="left")
+            plot.set_ylabel(f"{gate.metric}{unit}", fontsize=8)
             grid(plot)
 
-    return as_svg(240.0 * len(gates), 250, "Runs of the worst gates, old and new", draw)
+    return as_svg(240.0 * len(gates), 300, "Runs of the worst gates, old and new", draw)
+
+
+def _run(plot: Any, before: float | None, after: float | None) -> None:
+    if before is not None and after is not None:
+        plot.plot([0, 1], [before, after], color=palette.RULE, lw=0.9, zorder=1)
+    for x, value, colour in ((0, before, palette.MUTED), (1, after, palette.METHOD)):
+        if value is not None:
+            plot.plot([x], [value], "o", color=colour, ms=4, alpha=0.8, zorder=2)
 
 
 def _title(gate: Gate) -> str:
-    block, scenario, *rest = gate.group.split("/")
-    return "\n".join((f"{gate.metric} {gate.outcome}", f"{block}/{scenario}", "/".join(rest)[:44]))
+    """Verdict and group, in lines no longer than a figure is wide."""
+    lines = [gate.outcome, *gate.group.split("/", 4)]
+    return "\n".join(line if len(line) <= MOST_LETTERS else line[: MOST_LETTERS - 1] + "…" for line in lines)

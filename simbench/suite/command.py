@@ -6,11 +6,10 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import join
-from typing import Any
 
 import click
 
@@ -35,7 +34,7 @@ from simbench.suite.gate import as_lines
 from simbench.suite.judge import Asked, answer
 from simbench.suite.looks import until_decided
 from simbench.suite.plan import Group, Recording, groups_of, recordings_of
-from simbench.suite.run import Record, failed_text, in_order, made_of, record_text
+from simbench.suite.run import RECORDING_S, Record, failed_text, in_order, made_of, record_text
 from simbench.suite.select import chosen
 from simbench.suite.side import Side, read_side, side_of
 from simbench.suite.write import Told, failed_cases, write_answer, write_result, write_values
@@ -150,7 +149,7 @@ class _Run:
         told = Told(
             description=self.suite.description, command=join(["simbench", *sys.argv[1:]]), cost=self.cost(),
             against=None if asked.against is None else asked.against.name,
-            coverage=coverage(self.groups), seconds=_seconds(new, content["timings"]),
+            coverage=coverage(self.groups), seconds=_seconds(self.records),
         )  # fmt: skip
         write_values(new, asked.out)
         whole_content = write_result(content, found, asked.out)
@@ -216,18 +215,12 @@ class _Progress:
         )
 
 
-def _seconds(side: Side, timings: Sequence[dict[str, Any]]) -> dict[str, float]:
-    """Seconds of work by case: those of its recording."""
-    made = {
-        (t["block"], t["scenario"], t["system"], t["faults"], t["seed"]): t["value"]
-        for t in timings
-        if t["metric"] == "recording_s"
+def _seconds(records: Mapping[Recording, Record]) -> dict[str, float]:
+    """Seconds of work by case (group/seed): those of its recording."""
+    return {
+        f"{group}/{recording.job.seed}": timing["value"]
+        for recording, record in records.items()
+        for timing in record["timings"]
+        if timing["metric"] == RECORDING_S
+        for group in recording.groups
     }
-    found = {}
-    for name, of in side.groups.items():
-        block, scenario, system, faults, _ = name.split("/", 4)
-        for seed in of.runs:
-            key = (block, scenario, system, faults, int(seed))
-            if key in made:
-                found[f"{name}/{seed}"] = made[key]
-    return found

@@ -5,24 +5,22 @@ A baseline keeps these; a changed one is told by name. The code of pipelines is 
 
 from __future__ import annotations
 
-import hashlib
 import importlib.metadata
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 
 import scenarios
 import simbench
+from simbench.campaign.key import LIBRARIES, SOURCE, files_of, sha256_of
 from simbench.score.metrics import METRICS
 
-PACKAGES = ("mujoco", "numpy", "scipy", "numba", "opencv-python-headless")
 ROOMS = ("calibration", "dynamics", "faults", "formats", "score", "sensors")
 """Folders of simbench that decide numbers; its files at the top do too, but for those that only show."""
 ONLY_SHOW = (
     "cli.py", "doctor.py", "environment.py", "exhibit.py", "init.py", "limits.py", "outcome.py",
     "pytest_plugin.py", "timeline.py",
 )  # fmt: skip
-SUFFIXES = (".py", ".yaml", ".xml", ".json")
 SHORT = 12
 
 
@@ -30,11 +28,12 @@ SHORT = 12
 def fingerprints() -> Mapping[str, str]:
     """Part of the bench to a short hash of its files, or to its version."""
     bench, declared = Path(simbench.__file__).parent, Path(scenarios.__file__).parent
-    top = [path for path in bench.glob("*.py") if path.name not in ONLY_SHOW]
-    parts = {"simbench": _hash(top, bench)}
-    parts |= {f"simbench/{room}": _hash((bench / room).rglob("*"), bench) for room in ROOMS}
-    parts |= {"scenarios": _hash((p for p in declared.rglob("*") if "suites" not in p.parts), declared)}
-    return parts | {name: importlib.metadata.version(name) for name in PACKAGES}
+    top = [path for path in sorted(bench.glob("*.py")) if path.name not in ONLY_SHOW]
+    parts = {"simbench": [part for path in top for part in (path.name.encode(), path.read_bytes())]}
+    parts |= {f"simbench/{room}": list(files_of(bench / room, SOURCE)) for room in ROOMS}
+    parts |= {"scenarios": list(files_of(declared, SOURCE, besides="suites"))}
+    hashes = {name: sha256_of(content)[:SHORT] for name, content in parts.items()}
+    return hashes | {name: importlib.metadata.version(name) for name in LIBRARIES}
 
 
 @lru_cache(maxsize=1)
@@ -47,12 +46,4 @@ def metric_hashes() -> Mapping[str, str]:
 
 def short(data: bytes) -> str:
     """The first digits of a SHA-256: enough to tell versions apart, few enough to read."""
-    return hashlib.sha256(data).hexdigest()[:SHORT]
-
-
-def _hash(files: Iterable[Path], root: Path) -> str:
-    state = hashlib.sha256()
-    for path in sorted(p for p in files if p.suffix in SUFFIXES and p.is_file()):
-        data = path.read_bytes()
-        state.update(f"{path.relative_to(root).as_posix()}\0{len(data)}\0".encode() + data)
-    return state.hexdigest()[:SHORT]
+    return sha256_of([data])[:SHORT]

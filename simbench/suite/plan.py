@@ -48,7 +48,10 @@ class Group:
     @property
     def name(self) -> str:
         """block/scenario/system/faults/pipeline"""
-        pipeline = PurePath(self.pipeline).name  # of a file without its folder, which differs between users
+        path, _, attribute = self.pipeline.rpartition(":")
+        # Of a file without its folder, which differs between users.
+        pipeline = f"{PurePath(path).name}:{attribute}" if path.endswith(".py") else self.pipeline
+        pipeline = pipeline.replace("/", "|")
         return "/".join((self.block, self.scenario, self.job.system, self.faults, pipeline))
 
     def case(self, seed: int) -> str:
@@ -68,9 +71,12 @@ class Group:
 
 @dataclass(frozen=True, kw_only=True)
 class Recording:
-    """One job of a suite. groups: the name of the group that each of its pipelines' cases belongs to."""
+    """One job of a block, whose errors the suite calls `faults`. groups: the name of the group that each of
+    its pipelines' cases belongs to."""
 
     job: Job
+    block: str
+    faults: str
     groups: tuple[str, ...]
 
 
@@ -111,15 +117,18 @@ def groups_of(
 
 
 def recordings_of(cases: Sequence[tuple[Group, int]]) -> tuple[Recording, ...]:
-    """The jobs that make those cases: pipelines on the same drive share its recording."""
-    drives: dict[Job, dict[str, str]] = {}
+    """The jobs that make those cases: pipelines of a block on the same drive share its recording."""
+    drives: dict[tuple[str, str, Job], dict[str, str]] = {}
     for group, seed in cases:
-        drive = replace(group.at(seed), pipelines=())
+        drive = (group.block, group.faults, replace(group.at(seed), pipelines=()))
         drives.setdefault(drive, {})[group.pipeline] = group.name
     return tuple(
-        Recording(job=replace(drive, pipelines=tuple(groups)), groups=tuple(groups.values()))
-        for drive, groups in drives.items()
-    )
+        Recording(
+            job=replace(job, pipelines=tuple(groups)), block=block, faults=faults,
+            groups=tuple(groups.values()),
+        )
+        for (block, faults, job), groups in drives.items()
+    )  # fmt: skip
 
 
 def _jobs(file: SuiteFile, block: Block, where: Where) -> list[tuple[Job, str]]:
@@ -144,7 +153,7 @@ def _jobs(file: SuiteFile, block: Block, where: Where) -> list[tuple[Job, str]]:
                 scenario=target, system=system, seed=0, pipelines=(), faults=arguments, images=block.images,
                 boxes=block.boxes, changes=block.change,
             )  # fmt: skip
-            jobs.append((job, "+".join(PurePath(word).name for word in arguments) or OWN))
+            jobs.append((job, "+".join(map(_label, arguments)) or OWN))
     return jobs
 
 
@@ -153,6 +162,14 @@ def _beside(file: SuiteFile, scenario: str) -> str:
     if "/" not in scenario and not scenario.endswith((".yaml", ".yml")):
         return scenario
     return str(file.path.parent / scenario)
+
+
+def _label(words: str) -> str:
+    """What a fault is called in a group's name: a file by its stem; without the slash that parts names."""
+    if "=" in words:
+        return words.replace("/", "|")
+    path = PurePath(words)
+    return path.stem if path.suffix in (".yaml", ".yml") else path.name
 
 
 def _pipeline(file: SuiteFile, reference: str) -> str:

@@ -18,6 +18,7 @@ from simbench.stage import faults_of
 from simbench.suite.plan import Group, Recording, recordings_of
 from simbench.suite.side import Made, Side, side_of
 
+RECORDING_S = "recording_s"
 Record = Mapping[str, Sequence[Mapping[str, Any]]]
 """`rows`, `cases` and `timings` of one recording."""
 
@@ -42,13 +43,12 @@ def failed_text(recording: Recording, row: Done) -> str:
 
 def _text(recording: Recording, result: JobResult) -> str:
     """block, and the fault's name in the suite, in every entry: they tell groups of one scenario apart."""
-    block, _, _, faults, _ = recording.groups[0].split("/", 4)
-    mark = {"block": block, "faults": faults}
+    mark = {"block": recording.block, "faults": recording.faults}
     record = {name: [{**entry, **mark} for entry in entries] for name, entries in record_of(result).items()}
     first = record["cases"][0]
     timing = {name: first[name] for name in ("block", "scenario", "system", "seed", "faults")}
     seconds = sum(result.timings_s.values())
-    record["timings"].append({**timing, "metric": "recording_s", "value": seconds, "unit": "s"})
+    record["timings"].append({**timing, "metric": RECORDING_S, "value": seconds, "unit": "s"})
     return json.dumps(record, allow_nan=False)
 
 

@@ -65,6 +65,22 @@ def test_pipelines_of_one_drive_share_its_recording(tmp_path: Path) -> None:
     assert {name for recording in made for name in recording.groups} == {group.name for group in groups}
 
 
+def test_blocks_that_play_the_same_drive_both_get_their_cases(tmp_path: Path) -> None:
+    block = GOOD[GOOD.index("  one:") :]
+    groups = groups_of(load_suite(write(tmp_path, GOOD + block.replace("  one:", "  two:"))))
+    made = recordings_of([(group, seed) for group in groups for seed in group.seeds])
+    assert len(groups) == 12
+    assert {name for recording in made for name in recording.groups} == {group.name for group in groups}
+
+
+def test_a_slash_in_a_fault_parts_no_name(tmp_path: Path) -> None:
+    (tmp_path / "mine.yaml").write_text("faults: {timing.trigger_offset_ms: 5}\n", encoding="utf-8")
+    text = GOOD.replace("own,", f"{tmp_path}/mine.yaml, 'motion.trace={{file: a/b.csv}}',")
+    names = [group.name for group in groups_of(load_suite(write(tmp_path, text)))]
+    assert "one/overtake-approach/car/mine/robust" in names
+    assert {name.count("/") for name in names} == {4}
+
+
 def test_pipelines_and_seeds_may_be_replaced(tmp_path: Path) -> None:
     groups = groups_of(load_suite(write(tmp_path)), pipelines=("probabilistic",), seeds=(7,))
     assert {(group.pipeline, group.seeds, group.job.seed) for group in groups} == {("probabilistic", (7,), 7)}
