@@ -27,7 +27,7 @@ def main(reference: str, folder: str, memory_mb: str, parent: str) -> None:
     confine(int(memory_mb), int(parent))
     told, answers = _take_stdio()
     sys.path.insert(0, folder)
-    host = Host(_at(reference, folder))
+    host = Host(reference, folder)
     while (frame := read(told)) is not None:
         answers.write(host.answer(frame))
         answers.flush()
@@ -43,21 +43,21 @@ def _take_stdio() -> tuple[BinaryIO, BinaryIO]:
     return told, answers
 
 
-def _at(reference: str, folder: str) -> str:
-    """A reference to a file by its whole path; the file's folder is where its neighbours are found."""
-    where, _, attribute = reference.rpartition(":")
+def _whole(reference: str, folder: str) -> str:
+    """A reference to a file by its whole path; its folder is where its neighbours are found."""
+    where, _, _ = reference.rpartition(":")
     if not where.endswith(".py"):
         return reference
-    path = os.path.join(folder, where)
-    sys.path.insert(0, os.path.dirname(os.path.abspath(path)))
-    return f"{path}:{attribute}"
+    sys.path.insert(0, os.path.dirname(os.path.abspath(os.path.join(folder, where))))
+    return os.path.join(folder, reference)
 
 
 class Host:
     """A pipeline, made when its first run begins."""
 
-    def __init__(self, reference: str) -> None:
-        self._reference = reference
+    def __init__(self, reference: str, folder: str) -> None:
+        self._reference = _whole(reference, folder)
+        self._place = self._reference.removesuffix(reference)  # the user named it without
         self._factory: Any = None
         self._pipeline: Any = None
 
@@ -69,7 +69,8 @@ class Host:
             found = self._answer(Frame(kind=frame.kind, fields=fields, arrays=frame.arrays))
             return pack(_numbered(found, number))
         except BadInput as error:
-            why = {"why": error.problem, "allowed": error.allowed, "hint": error.hint}
+            problem = error.problem.replace(self._place, "") if self._place else error.problem
+            why = {"why": problem, "allowed": error.allowed, "hint": error.hint}
         except FrameError as error:
             why = {"why": str(error)}
         except BaseException as error:  # whatever the user's code raises ends its case, SystemExit too

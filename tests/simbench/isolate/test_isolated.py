@@ -195,7 +195,7 @@ def test_a_file_that_was_changed_is_asked_again(folder: Path) -> None:
 
 
 BAD = {
-    "nowhere.py:Mine": "pipeline '{folder}/nowhere.py:Mine': there is no file {folder}/nowhere.py.",
+    "nowhere.py:Mine": "pipeline 'nowhere.py:Mine': there is no file nowhere.py.",
     "mine.py:Mien": "has no 'Mien'; did you mean 'Mine'?",
     "mine.py:number": "is not callable (allowed: a class, or a function that makes one).",
     "quits.py:Mine": "cannot be loaded: its process ended with exit code 3 before it answered describe.",
@@ -226,7 +226,7 @@ def test_a_pipeline_that_cannot_be_loaded_is_one_sentence_and_exit_code_2(folder
     done = CliRunner().invoke(main, ["run", "overtake-approach", "--pipeline", name, "--out", "out"])
     assert done.exit_code == 2
     (line,) = done.stderr.splitlines()
-    assert BAD[name].format(folder=folder) in line
+    assert BAD[name] in line and str(folder) not in line
     assert not (folder / "out").exists()
     with pytest.raises(BadInput):
         check_pipeline_name(name)
