@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -107,27 +107,35 @@ def test_a_full_disk_costs_one_sentence_and_the_campaign_goes_on_when_there_is_r
     assert [row.value for row in rows] == [long(number) for number in range(300)]
 
 
-def test_workers_end_soon_after_a_driver_that_was_killed(tmp_path: Path) -> None:
-    process = driver(tmp_path, workers=2)
-    assert process.stdout is not None
-    for _ in range(5):
-        process.stdout.readline()
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
-    threads = Path(f"/proc/{process.pid}/task").iterdir()
-    pids = {
-        int(pid)
-        for thread in threads
-        for pid in (children.parent.parent / thread.name / "children").read_text().split()
-    }
-    assert len(pids) >= 2
+HANGS = """
+import sys
+from simbench.campaign.executor import open_executor
+from tests.simbench.campaign.tasks import odd
+if __name__ == "__main__":
+    with open_executor(2) as executor:
+        executor.submit(odd, ("tell", sys.argv[1])).result()
+"""
+
+
+def test_a_worker_in_mid_task_ends_soon_after_a_driver_that_was_killed(tmp_path: Path) -> None:
+    program, told = tmp_path / "hangs.py", tmp_path / "pid"
+    program.write_text(HANGS, encoding="utf-8")
+    process = subprocess.Popen(
+        [sys.executable, str(program), str(told)], cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}
+    )
+    _wait_for(lambda: told.exists() and bool(told.read_text(encoding="utf-8")), "no worker began")
+    pid = int(told.read_text(encoding="utf-8"))
+    assert _lives(pid)
     process.kill()
-    closed = threading.Event()
-    until_s = time.monotonic() + 60.0
-    while any(Path(f"/proc/{pid}").exists() and _lives(pid) for pid in pids):
-        assert time.monotonic() < until_s, "a worker outlived its driver"
-        closed.wait(0.1)
     process.wait()
-    process.stdout.close()
+    _wait_for(lambda: not _lives(pid), "the worker outlived its driver")
+
+
+def _wait_for(what: Callable[[], bool], otherwise: str) -> None:
+    until_s = time.monotonic() + 60.0
+    while not what():
+        assert time.monotonic() < until_s, otherwise
+        time.sleep(0.05)
 
 
 def _lives(pid: int) -> bool:
