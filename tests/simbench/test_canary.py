@@ -34,7 +34,7 @@ def test_a_bench_that_takes_receipts_for_granted_is_told_so() -> None:
 
 
 def test_a_bench_that_scores_in_spite_of_a_mismatch_is_told_so() -> None:
-    with mock.patch("simbench.run._spoiled", lambda case, _: case):
+    with mock.patch("simbench.run.spoiled", lambda case, _: case):
         assert "nobody noticed" in (canary() or "")
 
 
