@@ -98,13 +98,16 @@ def _noisy(read_e: float, lin: Levels, sensor: Electrons) -> Read:
 
 
 def _darkened(stops: float, lin: Levels, sensor: Electrons) -> Read:
-    """Variance and skewness of the electrons that are left, and of the read noise that is added."""
+    """The electrons that are left and the read noise that is added, by the first four cumulants of their sum
+    (Cornish and Fisher 1938): few electrons are not normal, and two cumulants alone see too little noise."""
     white_e, read_e = sensor
     kept, electrons = 2.0**-stops, np.rint(lin * white_e)
     shot = kept * (1.0 - kept) * electrons
     spread2 = shot + (1.0 - kept**2) * read_e**2 + 1e-12
-    skew = (1.0 - 2.0 * kept) * shot / (6.0 * spread2)
-    return np.asarray(lin + (np.sqrt(spread2) * Z + skew * (Z**2 - 1.0)) / (kept * white_e))
+    skew = (1.0 - 2.0 * kept) * shot / spread2**1.5
+    excess = (1.0 - 6.0 * kept * (1.0 - kept)) * shot / spread2**2
+    bent = skew * (Z**2 - 1.0) / 6.0 + excess * (Z**3 - 3.0 * Z) / 24.0 - skew**2 * (2.0 * Z**3 - 5.0 * Z) / 36.0
+    return np.asarray(lin + np.sqrt(spread2) * (Z + bent) / (kept * white_e))
 
 
 def _of_noise(spec: FaultSpec, step: Step, site: Site, what: str, read: Reading) -> tuple[Receipt, ...]:
