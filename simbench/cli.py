@@ -70,7 +70,3 @@ for verb in (
     run, score, stress, timeline,
 ):  # fmt: skip
     main.add_command(verb)
-
-
-if __name__ == "__main__":
-    main()

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 def execute(planned: list[Job], out: Path, images: Images, workers: int | None, as_json: bool) -> None:
     """Check every job before any runs, run them, write everything, exit by the worst status."""
-    import json
     import os
 
     from simbench import results as result_files
@@ -26,6 +25,7 @@ def execute(planned: list[Job], out: Path, images: Images, workers: int | None, 
     from simbench.formats.kitti import is_recorded
     from simbench.outcome import exit_code
     from simbench.report.page import write_report
+    from simbench.result_file import print_result
     from simbench.sensors import ray_kernel
     from simbench.sensors.compiled import is_compiled
     from simbench.stage import stage
@@ -42,13 +42,13 @@ def execute(planned: list[Job], out: Path, images: Images, workers: int | None, 
     with _Progress(len(planned)) as done:
         found = run_jobs(planned, workers or os.cpu_count() or 1, done)
     where = environment(images)
-    content = result_files.write(found, out, where)
+    result_files.write(found, out, where)
     command = "simbench " + " ".join(quote(word) for word in sys.argv[1:])
     if images != "none":
         _video(found, out, images)
     page = write_report(found, out, command=command, images=images, environment=where)
     if as_json:
-        click.echo(json.dumps(content, indent=1, allow_nan=False))
+        print_result(out)
     else:
         _print_summary(found)
         click.echo(f"report: {page}")

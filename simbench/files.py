@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from io import BufferedWriter
 from pathlib import Path
 
 from scenarios.errors import BadInput
@@ -32,20 +34,30 @@ def write_artifact(path: Path, data: bytes) -> None:
 
 def write_bytes(path: Path, data: bytes, *, durable: bool = False) -> None:
     """Write under a temporary name, then rename. BadInput where the place cannot be written."""
+    with writing(path, durable=durable) as file:
+        file.write(data)
+
+
+@contextmanager
+def writing(path: Path, *, durable: bool = False) -> Iterator[BufferedWriter]:
+    """A file of a temporary name, which gets its own when all is written. BadInput where the place cannot be
+    written; then, and when anything else is raised, nothing is left."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with temporary.open("wb") as file:
-            file.write(data)
+            yield file
             if durable:
                 file.flush()
                 os.fsync(file.fileno())
         temporary.replace(path)
         if durable:
             _sync_folder(path.parent)
-    except OSError as error:
+    except BaseException as error:
         with suppress(OSError):  # best effort: the first error is the one to tell
             temporary.unlink()
-        raise BadInput(f"cannot write {path}: {error.strerror or error}") from error
+        if isinstance(error, OSError):
+            raise BadInput(f"cannot write {path}: {error.strerror or error}") from error
+        raise
 
 
 def _sync_folder(folder: Path) -> None:

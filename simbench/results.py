@@ -1,6 +1,4 @@
-"""`result.json`: rows, cases, summary, timings and environment of a run, as `docs/results.md` describes
-them.
-"""
+"""What recordings add to `result.json`, as `docs/results.md` describes it; the tables beside it."""
 
 from __future__ import annotations
 
@@ -19,21 +17,12 @@ import numpy as np
 from fusion.check import digest
 from scenarios.describe import describe
 from scenarios.scenario import Scenario
-from scenarios.seeding import stream
 from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
 from simbench.drive import Driven
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
 from simbench.isolate.limits import DEFAULT
-from simbench.score.statistics import summarize
-
-SCHEMA = "simbench-result/1"
-GROUP = ("block", "scenario", "system", "faults", "calibration", "pipeline")  # what runs of a group share
-
-
-def document(results: Sequence[JobResult], environment: Mapping[str, object]) -> dict[str, Any]:
-    """The whole of `result.json`. Same inputs, same content, but for `timings` and `environment`."""
-    return assembled([record_of(result) for result in results], environment)
+from simbench.result_file import write_result
 
 
 def record_of(result: JobResult) -> dict[str, list[dict[str, Any]]]:
@@ -45,26 +34,10 @@ def record_of(result: JobResult) -> dict[str, list[dict[str, Any]]]:
     }
 
 
-def assembled(
-    records: Sequence[Mapping[str, Sequence[Mapping[str, Any]]]], environment: Mapping[str, object]
-) -> dict[str, Any]:
-    """`result.json` from what its recordings add."""
-    rows = [dict(row) for record in records for row in record["rows"]]
-    return {
-        "schema": SCHEMA,
-        "rows": rows,
-        "cases": [dict(case) for record in records for case in record["cases"]],
-        "summary": _summary(rows),
-        "timings": [dict(row) for record in records for row in record["timings"]],
-        "environment": dict(environment),
-    }
-
-
-def write(results: Sequence[JobResult], out: Path, environment: Mapping[str, object]) -> dict[str, Any]:
+def write(results: Sequence[JobResult], out: Path, environment: Mapping[str, object]) -> None:
     """Write result.json, pairs.csv, frames.csv and the resolved scenarios into `out`; objects.csv where every
-    object of a recording is scored."""
-    content = document(results, environment)
-    write_text(out / "result.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
+    object of a recording is scored. Same inputs, same content, but for `timings` and `environment`."""
+    write_result(out, map(record_of, results), environment)
     write_text(out / "pairs.csv", _table(results, "pairs"))
     write_text(out / "frames.csv", _table(results, "frames"))
     if any(case.scores is not None and case.scores.objects for r in results for case in r.cases):
@@ -72,7 +45,6 @@ def write(results: Sequence[JobResult], out: Path, environment: Mapping[str, obj
     for result in results:
         name = f"scenario-{result.scenario.name}-{result.job.seed}.yaml"
         write_text(out / name, _text(result))
-    return content
 
 
 def reproduce(job: Job, pipelines: Iterable[str]) -> str:
@@ -159,26 +131,6 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
         "boxes": boxes_of(result.job, not isinstance(result.scenario, Scenario)),
         "command": reproduce(result.job, pipelines),
     }
-
-
-def _summary(rows: Iterable[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Every metric over the runs of a group: what rows have in common but for their seed."""
-    groups: dict[tuple[str, ...], dict[str, list[Mapping[str, Any]]]] = {}
-    for row in rows:
-        group = groups.setdefault(tuple(row[name] for name in GROUP if name in row), {})
-        group.setdefault(row["metric"], []).append(row)
-    content = []
-    for group in groups.values():
-        for metric, members in group.items():
-            key = {name: members[0][name] for name in GROUP if name in members[0]}
-            told = ("scenario", "system", "faults", "pipeline")
-            rng = stream(0, "summary", *(key[name] for name in told), metric)
-            summary = summarize({row["seed"]: row["value"] for row in members}, rng)
-            content.append(
-                {**key, **{name: members[0][name] for name in ("metric", "unit", "better")},
-                 **dataclasses.asdict(summary)}
-            )  # fmt: skip
-    return content
 
 
 def latency_ms(case: Case) -> dict[str, tuple[float, int]]:

@@ -41,12 +41,12 @@ def score(
 
     Example: simbench score overtake-approach --system car --seed 0
     """
-    import json
     import shlex
     import sys
 
     from simbench.case import Job
     from simbench.elsewhere.command import print_rows, score_results, write_messages
+    from simbench.result_file import print_result
 
     job = Job(
         scenario=target, system=system, seed=seed, pipelines=(), faults=faults, changes=changes, boxes=boxes,
@@ -56,9 +56,9 @@ def score(
         click.echo(f"messages: {write_messages(job, out)}")
         return
     command = shlex.join(["simbench", *sys.argv[1:]])
-    content, code = score_results(job, results, out, command)
+    record, code = score_results(job, results, out, command)
     if as_json:
-        click.echo(json.dumps(content, indent=1, allow_nan=False))
+        print_result(out)
     else:
-        print_rows(content)
+        print_rows(record)
     raise SystemExit(code)

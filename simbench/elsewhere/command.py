@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-from typing import Any
 
 import click
 
-from simbench import results as result_files
 from simbench.case import Case, Job, JobResult, scored
 from simbench.drive import Driven
 from simbench.elsewhere.messages import messages_as_bytes
 from simbench.elsewhere.outputs import read_outputs
 from simbench.environment import environment
 from simbench.faults.receipt import MISMATCH
-from simbench.files import prepare_folder, write_bytes, write_text
+from simbench.files import prepare_folder, write_bytes
 from simbench.outcome import exit_code
+from simbench.result_file import Record, write_result
+from simbench.results import record_of
 from simbench.run import Made, recording_of, spoiled
 from simbench.score.objects import score_objects
 
@@ -32,8 +31,8 @@ def write_messages(job: Job, out: Path) -> Path:
     return path
 
 
-def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[dict[str, Any], int]:
-    """Score a file of results on the recording of a job: what is written as OUT/result.json, and the exit
+def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[Record, int]:
+    """Score a file of results on the recording of a job: what OUT/result.json is written of, and the exit
     code. Raises BadInput."""
     prepare_folder(out)
     scenario, faults, made = recording_of(job)
@@ -41,11 +40,11 @@ def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[dic
     result = JobResult(
         job=job, scenario=scenario, faults=faults, shake=made.shake, receipts=made.receipts, cases=(case,)
     )
-    content = result_files.document([result], environment(job.images))
-    for entry in content["cases"]:
+    record = record_of(result)
+    for entry in record["cases"]:
         entry["command"] = command
-    write_text(out / "result.json", json.dumps(content, indent=1, allow_nan=False) + "\n")
-    return content, exit_code([case.status])
+    write_result(out, [record], environment(job.images))
+    return record, exit_code([case.status])
 
 
 def _case(results: Path, made: Made) -> Case:
@@ -56,9 +55,9 @@ def _case(results: Path, made: Made) -> Case:
     return spoiled(case, bad) if bad else case
 
 
-def print_rows(content: dict[str, Any]) -> None:
+def print_rows(record: Record) -> None:
     """One line for each metric; the reason where there is no number."""
-    width = max(len(row["metric"]) for row in content["rows"])
-    for row in content["rows"]:
+    width = max(len(row["metric"]) for row in record["rows"])
+    for row in record["rows"]:
         value = f"{row['value']:.6g} {row['unit']}" if row["value"] is not None else f"- ({row['why']})"
         click.echo(f"{row['metric']:{width}s}  {value}")

@@ -106,7 +106,8 @@ def _darkened(stops: float, lin: Levels, sensor: Electrons) -> Read:
     spread2 = shot + (1.0 - kept**2) * read_e**2 + 1e-12
     skew = (1.0 - 2.0 * kept) * shot / spread2**1.5
     excess = (1.0 - 6.0 * kept * (1.0 - kept)) * shot / spread2**2
-    bent = skew * (Z**2 - 1.0) / 6.0 + excess * (Z**3 - 3.0 * Z) / 24.0 - skew**2 * (2.0 * Z**3 - 5.0 * Z) / 36.0
+    bent = skew * (Z**2 - 1.0) / 6.0
+    bent += excess * (Z**3 - 3.0 * Z) / 24.0 - skew**2 * (2.0 * Z**3 - 5.0 * Z) / 36.0
     return np.asarray(lin + np.sqrt(spread2) * (Z + bent) / (kept * white_e))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -10,7 +10,7 @@ from markupsafe import Markup
 from simbench.report import palette
 from simbench.report.figures import as_svg, grid
 from simbench.suite.gate import Gate
-from simbench.suite.side import Side
+from simbench.suite.side import Ran, Side
 
 LOOK = {
     "PASS": (palette.RIGHT, "o"),
@@ -20,6 +20,7 @@ LOOK = {
     "ERROR": (palette.INK, "D"),
 }
 MOST_LETTERS = 30  # of a line of a title
+MOST_DOTS = 200  # of a group
 MOST_MARGINS = 6.0  # what lies farther out is drawn at the edge
 
 
@@ -59,7 +60,7 @@ def old_and_new(gates: Sequence[Gate], old: Side | None, new: Side) -> Markup:
         plots = figure.subplots(1, len(gates), squeeze=False)[0]
         for plot, gate in zip(plots, gates, strict=True):
             earlier = old.groups.get(gate.group) if old is not None else None
-            for seed, run in new.groups[gate.group].runs.items():
+            for seed, run in _some(new.groups[gate.group].runs, gate.metric):
                 then = earlier.runs.get(seed) if earlier is not None else None
                 _run(plot, then.values.get(gate.metric) if then else None, run.values.get(gate.metric))
             if gate.limit is not None:
@@ -76,6 +77,15 @@ def old_and_new(gates: Sequence[Gate], old: Side | None, new: Side) -> Markup:
             grid(plot)
 
     return as_svg(240.0 * len(gates), 300, "Runs of the worst gates, old and new", draw)
+
+
+def _some(runs: Mapping[str, Ran], metric: str) -> list[tuple[str, Ran]]:
+    """All runs, or as many as can be told apart, evenly by value from the least to the greatest."""
+    known = [item for item in runs.items() if item[1].values.get(metric) is not None]
+    if len(known) <= MOST_DOTS:
+        return known
+    known.sort(key=lambda item: float(item[1].values[metric] or 0.0))
+    return [known[round(i * (len(known) - 1) / (MOST_DOTS - 1))] for i in range(MOST_DOTS)]
 
 
 def _run(plot: Any, before: float | None, after: float | None) -> None:

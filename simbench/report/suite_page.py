@@ -9,13 +9,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from simbench.files import write_text
 from simbench.report import palette
-from simbench.report.suite_figures import LOOK, forest, old_and_new
+from simbench.report.suite_figures import LOOK, MOST_DOTS, forest, old_and_new
 from simbench.suite.coverage import Coverage
 from simbench.suite.gate import Answer, Gate, interval, number
 from simbench.suite.side import Side
 
 NAME = "report.html"
-MOST_GATES, MOST_DRAWN, MOST_STRIPS, MOST_RUNS = 200, 40, 5, 50
+MOST_GATES, MOST_DRAWN, MOST_STRIPS, MOST_RUNS, MOST_SCENARIOS = 200, 40, 5, 50, 30
 
 
 def write_page(
@@ -42,6 +42,8 @@ def write_page(
         gates=answer.gates[:MOST_GATES], more=max(0, len(answer.gates) - MOST_GATES),
         forest=forest(drawn) if drawn else None, strips=old_and_new(strips, old, new) if strips else None,
         failed=failed[:MOST_RUNS], more_failed=max(0, len(failed) - MOST_RUNS), coverage=coverage,
+        columns=coverage.scenarios[:MOST_SCENARIOS] if coverage else (),
+        most_dots=MOST_DOTS if any(len(new.groups[gate.group].runs) > MOST_DOTS for gate in strips) else 0,
         again=lambda gate: again(gate, new), number=number, interval=interval, colour=lambda o: LOOK[o][0],
         bench=new.bench, c=palette,
     )  # fmt: skip
@@ -51,9 +53,10 @@ def write_page(
 
 def again(gate: Gate, side: Side) -> str:
     """The line that makes the worst run of a gate again."""
-    if gate.worst is None or gate.group not in side.groups:
+    of = side.groups.get(gate.worst_group or gate.group)
+    if gate.worst is None or of is None:
         return ""
-    run = side.groups[gate.group].runs.get(str(gate.worst))
+    run = of.runs.get(str(gate.worst))
     return "" if run is None else run.command
 
 

@@ -26,6 +26,7 @@ MIN_RUNS = 6
 BOOTSTRAP_RUNS = 20
 SIGN_FLIP_RUNS = 20
 RESAMPLES = 9999
+AT_ONCE = 4_000_000  # values drawn at a time
 
 Alternative = Literal["two-sided", "greater", "less"]
 Run = TypeVar("Run", bound=Hashable)
@@ -153,8 +154,14 @@ def bca_interval(
     if n < 2:
         raise ValueError("a bootstrap interval needs at least 2 values")
     observed = float(statistic(array))
-    replicates = statistic(array[rng.integers(0, n, size=(resamples, n))])
-    jackknife = statistic(np.stack([np.delete(array, i) for i in range(n)]))
+    at_once = max(1, AT_ONCE // n)
+    replicates = np.concatenate(
+        [
+            statistic(array[rng.integers(0, n, size=(min(at_once, resamples - done), n))])
+            for done in range(0, resamples, at_once)
+        ]
+    )
+    jackknife = np.array([statistic(np.delete(array, i)) for i in range(n)])
     pull = jackknife.mean() - jackknife
     spread = float((pull**2).sum())
     if spread <= (1e-12 * max(1.0, abs(observed))) ** 2:

@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import join
@@ -27,17 +27,17 @@ from simbench.environment import environment
 from simbench.files import prepare_folder
 from simbench.isolate.ask import check_pipeline_name
 from simbench.isolate.limits import DEFAULT, Isolate, Limits
-from simbench.results import assembled
+from simbench.result_file import Record, print_result, write_result
 from simbench.stage import stage
 from simbench.suite.coverage import coverage
 from simbench.suite.gate import as_lines
 from simbench.suite.judge import Asked, answer
 from simbench.suite.looks import until_decided
 from simbench.suite.plan import Group, Recording, groups_of, recordings_of
-from simbench.suite.run import RECORDING_S, Record, failed_text, in_order, made_of, record_text
+from simbench.suite.run import failed_text, record_text, runs_of, seconds_of
 from simbench.suite.select import chosen
-from simbench.suite.side import Side, read_side, side_of
-from simbench.suite.write import Told, failed_cases, write_answer, write_result, write_values
+from simbench.suite.side import Ran, Side, read_side, side_of
+from simbench.suite.write import Told, failed_cases, verdict_of, write_answer, write_values
 
 NOTHING = 5
 
@@ -121,13 +121,16 @@ def _why(asked: Request) -> str:
 
 @dataclass(kw_only=True)
 class _Run:
-    """The state of a run: which recordings were made so far."""
+    """The state of a run: which recordings were made so far, by their keys in the ledger, and what gates read
+    of them."""
 
     suite: Suite
     asked: Request
     ledger: Ledger
     groups: Sequence[Group]
-    records: dict[Recording, Record] = field(default_factory=dict)
+    keys: dict[Recording, str] = field(default_factory=dict)
+    ran: dict[str, dict[int, Ran]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
     fresh: int = 0
     wall_s: float = 0.0
 
@@ -145,17 +148,16 @@ class _Run:
         found = answer(
             new, old, Asked(changed=asked.allow_changed, look=look), canary=blind, settled=settled
         )  # fmt: skip
-        content = assembled(list(self.records.values()), environment("none"))
         told = Told(
             description=self.suite.description, command=join(["simbench", *sys.argv[1:]]), cost=self.cost(),
             against=None if asked.against is None else asked.against.name,
-            coverage=coverage(self.groups), seconds=_seconds(self.records),
+            coverage=coverage(self.groups), seconds=self.seconds,
         )  # fmt: skip
         write_values(new, asked.out)
-        whole_content = write_result(content, found, asked.out)
+        write_result(asked.out, self.records(), environment("none"), verdict=verdict_of(found))
         page = write_answer(found, new, old, asked.out, told)
         if asked.as_json:
-            click.echo(json.dumps(whole_content, indent=1, allow_nan=False))
+            print_result(asked.out)
         else:
             for line in (*as_lines(found.gates), *found.notes, *found.problems[1:], found.sentence):
                 click.echo(line)
@@ -164,8 +166,9 @@ class _Run:
 
     def measure(self, cases: Sequence[tuple[Group, int]], whole: bool) -> Side:
         """Run what was not run yet; the side of all so far."""
-        recordings = [r for r in recordings_of(cases) if r not in self.records]
+        recordings = [r for r in recordings_of(cases) if r not in self.keys]
         keys = {_key(recording): recording for recording in recordings}
+        groups = {group.name: group for group in self.groups}
         missing = sum(key not in self.ledger for key in keys)
         if missing < len(keys):
             click.echo(f"{len(keys) - missing} of {len(keys)} recordings are there already", err=True)
@@ -178,18 +181,32 @@ class _Run:
                 lambda row: progress.say(keys[row.key], row),
             )  # fmt: skip
             for row in rows:
-                recording = keys[row.key]
-                text = failed_text(recording, row) if row.value is None else row.value
-                self.records[recording] = json.loads(text)
+                recording, record = keys[row.key], _record(keys[row.key], row)
+                self.keys[recording] = row.key
+                for name, one in runs_of(recording, record, groups).items():
+                    self.ran.setdefault(name, {})[recording.job.seed] = one
+                    self.seconds[f"{name}/{recording.job.seed}"] = seconds_of(record)
+        lost = [group.case(seed) for group, seed in cases if seed not in self.ran.get(group.name, {})]
+        if lost:
+            raise RuntimeError(f"{len(lost)} cases were meant and have no result, among them {lost[0]}")
         self.wall_s += time.perf_counter() - begun
         self.fresh += missing
-        made = in_order(self.groups, made_of(list(self.records), list(self.records.values())))
-        return side_of(self.suite.name, {group.name: group for group in self.groups}, made, whole=whole)
+        return side_of(self.suite.name, self.groups, self.ran, whole=whole)
+
+    def records(self) -> Iterator[Record]:
+        """What every recording adds to `result.json`, read again from the ledger: all of them may be more
+        than memory holds."""
+        for recording, key in self.keys.items():
+            yield _record(recording, self.ledger.get(key))
 
     def cost(self) -> str:
         """What the run took, in words."""
         now = f"{self.fresh} of them now in {self.wall_s:.0f} s" if self.fresh else "none of them now"
-        return f"{len(self.records)} recordings, {now}."
+        return f"{len(self.keys)} recordings, {now}."
+
+
+def _record(recording: Recording, row: Done) -> Record:
+    return dict(json.loads(failed_text(recording, row) if row.value is None else row.value))
 
 
 def _key(recording: Recording) -> str:
@@ -213,14 +230,3 @@ class _Progress:
             f"({left_s / 60:.1f} min left)",
             err=True,
         )
-
-
-def _seconds(records: Mapping[Recording, Record]) -> dict[str, float]:
-    """Seconds of work by case (group/seed): those of its recording."""
-    return {
-        f"{group}/{recording.job.seed}": timing["value"]
-        for recording, record in records.items()
-        for timing in record["timings"]
-        if timing["metric"] == RECORDING_S
-        for group in recording.groups
-    }

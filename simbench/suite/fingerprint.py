@@ -18,8 +18,8 @@ from simbench.score.metrics import METRICS
 ROOMS = ("calibration", "dynamics", "faults", "formats", "score", "sensors")
 """Folders of simbench that decide numbers; its files at the top do too, but for those that only show."""
 ONLY_SHOW = (
-    "cli.py", "doctor.py", "environment.py", "exhibit.py", "init.py", "limits.py", "outcome.py",
-    "pytest_plugin.py", "timeline.py",
+    "__main__.py", "cli.py", "doctor.py", "environment.py", "exhibit.py", "init.py", "limits.py",
+    "outcome.py", "pytest_plugin.py", "result_file.py", "timeline.py",
 )  # fmt: skip
 SHORT = 12
 

@@ -29,7 +29,8 @@ class Gate:
     """old, new: means over runs, in `unit`. threshold: in words. difference: new - old, turned so that more
     is better; low, high: its one-sided bounds, of a limit the interval of the mean. n: runs that count. ours:
     an ERROR that the bench or the suite is to blame for, not the pipeline. beyond: by how much the gate is
-    missed, in margins or limits, for the order."""
+    missed, in margins or limits, for the order. worst: the seed of the worst run; worst_group: its group,
+    where that is not `group`."""
 
     group: str
     kind: Kind
@@ -47,6 +48,7 @@ class Gate:
     ours: bool = False
     beyond: float = 0.0
     worst: int | None = None
+    worst_group: str | None = None
     margin: float | None = None
     limit: float | None = None
 

@@ -16,6 +16,7 @@ from simbench.score.metrics import Metric
 from simbench.score.statistics import summarize
 from simbench.suite.changes import changes
 from simbench.suite.gate import Answer, Gate, Kind, worst_first
+from simbench.suite.pools import Pool, group_of, pools_of
 from simbench.suite.side import Ran, Runs, Side
 from simbench.verdict.decide import ALPHA, Judgement, judge
 from simbench.verdict.overall import suite_verdict
@@ -51,8 +52,10 @@ def answer(
             gates += _rare(name, of, old, asked)
     problems, notes = changes(old, new, allowed=asked.changed) if old is not None else ([], [])
     if old is not None:
+        notes.append(_claim(new, old, asked.look))
         gates += _missing(old, new, notes)
-        gates += _baseline(new, old, compared(new, old) if settled is None else settled)
+        judgements = compared(new, old) if settled is None else settled
+        gates += _baseline(new, old, judgements, asked.look)
     gates.append(
         Gate(
             group=new.suite, kind="canary", metric="", unit="", outcome="ERROR" if canary else "PASS",
@@ -66,52 +69,71 @@ def compared(
     new: Side, old: Side, look: int | None = None, groups: Collection[str] | None = None
 ) -> dict[Key, Judgement]:
     """All metrics of the groups that both sides have (of these only: `groups`), adjusted to one another.
-    look: of a sequential test."""
+    look: of a sequential test, which takes every scenario by itself."""
     found: dict[Key, Judgement] = {}
-    for name, of in new.groups.items():
-        if name not in old.groups or (groups is not None and name not in groups):
-            continue
-        before = old.groups[name]
-        for word, margin in of.margins.items():
-            if all(word not in run.values for run in before.runs.values()):
+    for pool in _pools(new, old, look, groups):
+        identical = all(_identical(old.groups[name], new.groups[name]) for name in pool.groups)
+        for word, margin in new.groups[pool.groups[0]].margins.items():
+            if all(word not in run.values for name in pool.groups for run in old.groups[name].runs.values()):
                 continue
-            metric = _metric(word)
-            sides = (_values(before, metric), _values(of, metric))
-            rng, identical = stream(0, "verdict", name, word), _identical(before, of)
+            metric, rng = _metric(word), stream(0, "verdict", pool.name, word)
+            sides = (pool.values(old, metric), pool.values(new, metric))
             if look is None:
-                found[name, word] = judge(
-                    *sides, better=metric.better, margin=margin, rng=rng, identical=identical
-                )
+                found[pool.name, word] = judge(
+                    *sides, better=metric.better, margin=margin, rng=rng, identical=identical,
+                    scenario_of=group_of if pool.is_sample else None,
+                )  # fmt: skip
             else:
-                found[name, word] = decide_at(
+                found[pool.name, word] = decide_at(
                     look, *sides, better=metric.better, margin=margin, rng=rng, identical=identical
                 )
     return dict(suite_verdict(found).judgements)
 
 
-def _baseline(new: Side, old: Side, judgements: Mapping[Key, Judgement]) -> list[Gate]:
-    gates = [_compared(key, judgement, new, old) for key, judgement in judgements.items()]
-    for name, of in new.groups.items():
-        for word in of.margins:
-            if name in old.groups and (name, word) not in judgements:
-                gates.append(_error(name, "baseline", word, "the baseline has no values of it", ours=True))
+def _baseline(new: Side, old: Side, judgements: Mapping[Key, Judgement], look: int | None) -> list[Gate]:
+    gates = []
+    for pool in _pools(new, old, look):
+        for word in new.groups[pool.groups[0]].margins:
+            judgement = judgements.get((pool.name, word))
+            if judgement is not None:
+                gates.append(_compared(pool, _metric(word), judgement, new, old))
+            else:
+                why = "the baseline has no values of it"
+                gates.append(_error(pool.name, "baseline", word, why, ours=True))
     return gates
 
 
-def _compared(key: Key, j: Judgement, new: Side, old: Side) -> Gate:
-    group, metric = key[0], _metric(key[1])
-    before, after = _values(old.groups[group], metric), _values(new.groups[group], metric)
+def _claim(new: Side, old: Side, look: int | None) -> str:
+    """What the verdicts are about."""
+    if any(pool.is_sample for pool in _pools(new, old, look)):
+        return (
+            "Scenarios of a gate with 20 or more are a sample, and its verdict is about all that they stand "
+            "for; every other verdict is about its own scenario."
+        )
+    return "Verdicts are about these scenarios, over their random draws; not about other scenarios."
+
+
+def _pools(new: Side, old: Side, look: int | None, groups: Collection[str] | None = None) -> list[Pool]:
+    """Of the groups that both sides have. A sequential test takes every scenario by itself."""
+    some = [name for name in new.groups if name in old.groups and (groups is None or name in groups)]
+    return pools_of(some) if look is None else [Pool(name=name, groups=(name,)) for name in some]
+
+
+def _compared(pool: Pool, metric: Metric, j: Judgement, new: Side, old: Side) -> Gate:
+    before, after = pool.values(old, metric), pool.values(new, metric)
     sign = 1.0 if metric.better == "higher" else -1.0
     lost = {
-        seed: sign * (a - b)
-        for seed, b in after.items()
-        if b is not None and (a := before.get(seed)) is not None
+        run: sign * (a - b)
+        for run, b in after.items()
+        if b is not None and (a := before.get(run)) is not None
     }
+    where, worst = pool.case(max(lost, key=lambda run: lost[run])) if lost else (None, None)
+    notes = ["a sample of scenarios"] if pool.is_sample else []
     return Gate(
-        group=group, kind="baseline", metric=metric.name, unit=metric.unit, outcome=j.verdict,
+        group=pool.name, kind="baseline", metric=metric.name, unit=metric.unit, outcome=j.verdict,
         threshold=f"loss < {j.margin:g}", old=j.old, new=j.new, difference=j.difference, low=j.low,
-        high=j.high, n=j.n, note=j.note or "", beyond=j.beyond, margin=j.margin,
-        worst=int(str(max(lost, key=lambda seed: lost[seed]))) if lost else None,
+        high=j.high, n=j.n, note="; ".join([*notes, j.note] if j.note else notes), beyond=j.beyond,
+        margin=j.margin, worst=worst, worst_group=where if pool.is_sample else None,
     )  # fmt: skip
 
 

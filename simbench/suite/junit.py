@@ -19,7 +19,9 @@ REFUSED = re.compile("[^\t\n\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 def junit(answer: Answer, side: Side, seconds: Mapping[str, float]) -> str:
     """The document. seconds: of work, by case (group/seed)."""
-    suites = []
+    suites, asked = [], dict[str, list[Gate]]()
+    for gate in answer.gates:
+        asked.setdefault(gate.group, []).append(gate)
     for group, of in side.groups.items():
         cases = []
         for seed, run in of.runs.items():
@@ -31,7 +33,7 @@ def junit(answer: Answer, side: Side, seconds: Mapping[str, float]) -> str:
             if run.status != "ok":
                 _told(case, "error", run.status, run.why or run.status)
             cases.append(case)
-        gates = [gate for gate in answer.gates if gate.group == group and gate.kind != "runs"]
+        gates = [gate for gate in asked.get(group, ()) if gate.kind != "runs"]
         suites.append(_suite(group, [*cases, *(_gate(gate) for gate in gates)]))
     known = set(side.groups)
     others = [gate for gate in answer.gates if gate.group not in known]

@@ -6,21 +6,20 @@ The text is the row of the ledger: the same for one worker, for many, and on a c
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, cast
+from collections.abc import Mapping
+from typing import cast
 
 from scenarios.load import load_scenario
 from simbench.campaign.ledger import Done
 from simbench.case import ORACLE, JobResult, Status, failed
+from simbench.result_file import Record
 from simbench.results import record_of
 from simbench.run import run_job
 from simbench.stage import faults_of
 from simbench.suite.plan import Group, Recording, recordings_of
-from simbench.suite.side import Made, Side, side_of
+from simbench.suite.side import Ran, Side, ran_of, side_of
 
 RECORDING_S = "recording_s"
-Record = Mapping[str, Sequence[Mapping[str, Any]]]
-"""`rows`, `cases` and `timings` of one recording."""
 
 
 def record_text(recording: Recording) -> str:
@@ -52,34 +51,31 @@ def _text(recording: Recording, result: JobResult) -> str:
     return json.dumps(record, allow_nan=False)
 
 
-def made_of(recordings: Sequence[Recording], records: Sequence[Record]) -> dict[str, dict[int, Made]]:
-    """The cases by group and seed, with values and latencies; oracles are left out."""
-    made: dict[str, dict[int, Made]] = {}
-    for recording, record in zip(recordings, records, strict=True):
-        values: dict[str, dict[str, float | None]] = {}
-        for row in (*record["rows"], *record["timings"]):
-            if "pipeline" in row:
-                values.setdefault(row["pipeline"], {})[row["metric"]] = row["value"]
-        groups = dict(zip(recording.job.pipelines, recording.groups, strict=True))
-        for case in record["cases"]:
-            if case["pipeline"] != ORACLE:
-                one = Made(case=case, values=values.get(case["pipeline"], {}))
-                made.setdefault(groups[case["pipeline"]], {})[recording.job.seed] = one
-    return made
-
-
-def in_order(groups: Iterable[Group], made: Mapping[str, Mapping[int, Made]]) -> dict[str, dict[int, Made]]:
-    """The same, groups in the order of the suite and runs in the order of their seeds."""
+def runs_of(recording: Recording, record: Record, groups: Mapping[str, Group]) -> dict[str, Ran]:
+    """What gates read of one recording, by the name of the group; oracles are left out."""
+    values: dict[str, dict[str, float | None]] = {}
+    for row in (*record["rows"], *record["timings"]):
+        if "pipeline" in row:
+            values.setdefault(row["pipeline"], {})[row["metric"]] = row["value"]
+    names = dict(zip(recording.job.pipelines, recording.groups, strict=True))
     return {
-        group.name: {seed: made[group.name][seed] for seed in sorted(made[group.name])}
-        for group in groups
-        if group.name in made
+        names[case["pipeline"]]: ran_of(
+            groups[names[case["pipeline"]]], case, values.get(case["pipeline"], {})
+        )
+        for case in record["cases"]
+        if case["pipeline"] != ORACLE
     }
+
+
+def seconds_of(record: Record) -> float:
+    """How long a recording took to make, with all of its pipelines."""
+    return sum(timing["value"] for timing in record["timings"] if timing["metric"] == RECORDING_S)
 
 
 def side_of_group(suite: str, group: Group) -> Side:
     """Run all seeds of one group here; its side."""
-    recordings = recordings_of([(group, seed) for seed in group.seeds])
-    records = [json.loads(record_text(recording)) for recording in recordings]
-    made = in_order([group], made_of(recordings, records))
-    return side_of(suite, {group.name: group}, made, whole=False)
+    ran = {}
+    for recording in recordings_of([(group, seed) for seed in group.seeds]):
+        record = json.loads(record_text(recording))
+        ran[recording.job.seed] = runs_of(recording, record, {group.name: group})[group.name]
+    return side_of(suite, [group], {group.name: ran}, whole=False)

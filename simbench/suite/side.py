@@ -7,8 +7,7 @@ line of its own, so that a review of a changed baseline reads line by line.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -63,43 +62,38 @@ class Side(Spec):
     groups: Mapping[Word, Runs]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Made:
-    """What records hold of one case: its entry in `result.json`, its values and latencies."""
-
-    case: Mapping[str, Any]
-    values: Mapping[str, float | None]
-
-
 def side_of(
-    suite: str, groups: Mapping[str, Group], made: Mapping[str, Mapping[int, Made]], *, whole: bool
+    suite: str, groups: Iterable[Group], ran: Mapping[str, Mapping[int, Ran]], *, whole: bool
 ) -> Side:
-    """The side of a run. made: by group and seed."""
-    asked = {metric.name for name in made for metric, _ in groups[name].metrics}
+    """The side of a run. groups: in the order of the suite. ran: by group and seed; a group of which nothing
+    ran is left out."""
+    some = [group for group in groups if group.name in ran]
+    asked = {metric.name for group in some for metric, _ in group.metrics}
     return Side(
         suite=suite, whole=whole, bench=fingerprints(),
         metrics={name: digest for name, digest in metric_hashes().items() if name in asked},
         groups={
-            name: Runs(
-                margins={metric.name: margin for metric, margin in groups[name].metrics},
-                limits={limit.metric.name: limit.text_of_value for limit in groups[name].limits},
-                failed_runs=groups[name].failed_runs,
-                runs={str(seed): _ran(groups[name], one) for seed, one in runs.items()},
+            group.name: Runs(
+                margins={metric.name: margin for metric, margin in group.metrics},
+                limits={limit.metric.name: limit.text_of_value for limit in group.limits},
+                failed_runs=group.failed_runs,
+                runs={str(seed): ran[group.name][seed] for seed in sorted(ran[group.name])},
             )
-            for name, runs in made.items()
+            for group in some
         },
     )  # fmt: skip
 
 
-def _ran(group: Group, made: Made) -> Ran:
-    case, gross = made.case, made.values.get(GROSS)
+def ran_of(group: Group, case: Mapping[str, Any], values: Mapping[str, float | None]) -> Ran:
+    """What gates read of one case: its entry in `result.json`, its values and latencies."""
+    gross = values.get(GROSS)
     setting = json.dumps([group.job.images, case["boxes"], case["calibration"], case["off"]])
     return Ran(
         status=case["status"],
         scenario=short(f"{case['scenario_sha256']} {setting}".encode()),
         outputs=case["outputs_sha256"] and case["outputs_sha256"][:16],
         gross=None if gross is None else gross > 0.0,
-        values={name: _rounded(made.values.get(name)) for name in group.values},
+        values={name: _rounded(values.get(name)) for name in group.values},
         why=case["why"],
         command=case["command"],
     )

@@ -12,13 +12,15 @@ from typing import Any
 from scenarios.errors import BadInput
 from simbench.files import write_text
 from simbench.report.suite_page import write_page
+from simbench.result_file import NAME as RESULT
 from simbench.suite.coverage import Coverage
 from simbench.suite.gate import Answer
 from simbench.suite.junit import junit
 from simbench.suite.markdown import markdown
+from simbench.suite.pools import pools_of
 from simbench.suite.side import NAME, Side, read_side, write_side
 
-RESULT, JUNIT, SUMMARY = "result.json", "junit.xml", "summary.md"
+JUNIT, SUMMARY = "junit.xml", "summary.md"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +51,6 @@ def write_values(side: Side, out: Path) -> None:
     write_side(side, out / NAME, commands=True)
 
 
-def write_result(content: Mapping[str, Any], answer: Answer, out: Path) -> dict[str, Any]:
-    """result.json with the gates and the verdict."""
-    whole = {**content, "verdict": verdict_of(answer)}
-    write_text(out / RESULT, json.dumps(whole, indent=1, allow_nan=False) + "\n")
-    return whole
-
-
 def verdict_of(answer: Answer) -> dict[str, Any]:
     """The answer as plain data."""
     return {
@@ -82,9 +77,10 @@ def failed_cases(path: Path) -> set[str]:
     try:
         verdict = json.loads((path / RESULT).read_text(encoding="utf-8"))["verdict"]
         gates: Sequence[Mapping[str, Any]] = verdict["gates"]
-        missed = {gate["group"] for gate in gates if gate["outcome"] != "PASS" and gate["kind"] != "runs"}
+        bad = {gate["group"] for gate in gates if gate["outcome"] != "PASS" and gate["kind"] != "runs"}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise BadInput("is no result of a suite", file=str(path / RESULT)) from error
+    missed = {name for pool in pools_of(side.groups) if pool.name in bad for name in pool.groups} | bad
     return {
         f"{name}/{seed}"
         for name, of in side.groups.items()

@@ -7,6 +7,7 @@ there is nothing to compare, or the new version has no value where the old one h
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -15,6 +16,7 @@ import numpy as np
 from simbench.score.statistics import MIN_RUNS, SIGN_FLIP_RUNS, sign_flip_p
 from simbench.verdict.bounds import Bounds, Method, bounds
 from simbench.verdict.differences import Better, Differences, Values, differences, runs
+from simbench.verdict.nested import SCENARIOS, nested_bounds
 
 Verdict: TypeAlias = Literal["ERROR", "REGRESSION", "INCONCLUSIVE", "PASS"]
 WORST_FIRST: tuple[Verdict, ...] = ("ERROR", "REGRESSION", "INCONCLUSIVE", "PASS")
@@ -65,12 +67,14 @@ class Judgement:
 
 def judge(
     old: Values, new: Values, *, better: Better, margin: float = MARGIN, alpha: float = ALPHA,
-    rng: np.random.Generator, identical: bool = False,
+    rng: np.random.Generator, identical: bool = False, scenario_of: Callable[[Hashable], str] | None = None,
 ) -> Judgement:  # fmt: skip
     """Compare two versions run by run.
 
-    margin: in the metric's unit. identical: all outputs of both versions have the same hash. ValueError: a
-    value is not finite, the margin is not above 0, or alpha not between 0 and 0.5.
+    margin: in the metric's unit. identical: all outputs of both versions have the same hash. scenario_of: the
+    scenario of a run's key, where 20 or more are a sample of all that may happen; scenarios weigh the same
+    then. None: they are fixed. ValueError: a value is not finite, the margin is not above 0, or alpha not
+    between 0 and 0.5.
     """
     if not (np.isfinite(margin) and margin > 0.0):
         raise ValueError(f"a margin is a finite number above 0, not {margin}")
@@ -87,11 +91,26 @@ def judge(
         return replace(blank, note=wrong)
     if identical:
         return replace(blank, verdict="PASS", method="identical", note="identical")
+    if scenario_of is not None:
+        return _over_scenarios(blank, paired, scenario_of, rng)
     said = bounds(paired.d, rng)
     if said is None:
         few = f"n = {n} run{'' if n == 1 else 's'}: illustration"
         return replace(blank, verdict="INCONCLUSIVE", note=_join(few, *_uneven(paired)))
     return _decided(blank, paired, said)
+
+
+def _over_scenarios(
+    blank: Judgement, paired: Differences, scenario_of: Callable[[Hashable], str], rng: np.random.Generator
+) -> Judgement:
+    of: dict[str, list[float]] = {}
+    for run, d in zip(paired.keys, paired.d, strict=True):
+        of.setdefault(scenario_of(run), []).append(float(d))
+    if len(of) < SCENARIOS:
+        return replace(blank, note=f"only {len(of)} scenarios have a value on both sides")
+    values = [np.array(some) for some in of.values()]
+    mean = float(np.mean([some.mean() for some in values]))
+    return _decided(replace(blank, difference=mean), paired, nested_bounds(values, rng))
 
 
 def _wrong(paired: Differences, identical: bool) -> str | None:

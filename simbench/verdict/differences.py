@@ -20,13 +20,15 @@ NAMED = 5
 class Differences:
     """D = new - old over the runs that have both values, turned so that higher is better.
 
-    d: in the order of the runs' keys as text, so that the order in which they came decides nothing. old, new:
+    d: in the order of the runs' keys as text, so that the order in which they came decides nothing; keys:
+    those. old, new:
     means over the same runs, as they were given; None without any. missing: runs without a value on either
     side; lost: with the old value only; gained: with the new one only; only_old, only_new: runs that
     the other side does not have at all.
     """
 
     d: Float64[np.ndarray, " n"]
+    keys: tuple[Hashable, ...]
     old: float | None
     new: float | None
     missing: tuple[Hashable, ...]
@@ -46,14 +48,15 @@ def differences(old: Values, new: Values, better: Better) -> Differences:
             raise ValueError(f"the value of run {bad[0]} is not finite; use None for a run without a value")
     shared = [run for run in old if run in new]
     pairs = [
-        (a, b)
-        for a, b in ((old[run], new[run]) for run in sorted(shared, key=repr))
+        (run, a, b)
+        for run, a, b in ((run, old[run], new[run]) for run in sorted(shared, key=repr))
         if a is not None and b is not None
     ]
-    before = np.array([a for a, _ in pairs], dtype=np.float64)
-    after = np.array([b for _, b in pairs], dtype=np.float64)
+    before = np.array([a for _, a, _ in pairs], dtype=np.float64)
+    after = np.array([b for _, _, b in pairs], dtype=np.float64)
     return Differences(
         d=after - before if better == "higher" else before - after,
+        keys=tuple(run for run, _, _ in pairs),
         old=float(before.mean()) if pairs else None,
         new=float(after.mean()) if pairs else None,
         missing=tuple(run for run in shared if old[run] is None and new[run] is None),

@@ -18,7 +18,8 @@ from click.testing import CliRunner
 from scenarios.load import load_scenario
 from simbench.campaign.jobs import run_jobs
 from simbench.case import Job, JobResult
-from simbench.results import document, reproduce, write
+from simbench.result_file import document
+from simbench.results import record_of, reproduce, write
 from simbench.score.metrics import METRICS
 from simbench.stage import Stage, stage
 from tests.simbench import cheats
@@ -59,13 +60,13 @@ def found() -> tuple[JobResult, ...]:
 
 @pytest.fixture(scope="module")
 def content(found: tuple[JobResult, ...]) -> dict[str, list[dict[str, object]]]:
-    return document(found, {"python": "test"})
+    return document(map(record_of, found), {"python": "test"})
 
 
 def test_the_same_seeds_give_the_same_bytes_but_for_timings(found: tuple[JobResult, ...]) -> None:
     texts = []
     for run in ([r for r in found if r.job.seed == 3], results((3,))):
-        whole = copy.deepcopy(document(run, {}))
+        whole = copy.deepcopy(document(map(record_of, run), {}))
         assert whole.pop("timings")
         texts.append(json.dumps(whole, allow_nan=False))
     assert texts[0] == texts[1]
@@ -119,7 +120,7 @@ def test_rows_of_a_found_calibration_can_be_told_from_those_of_the_true_one(
     found: tuple[JobResult, ...], tmp_path: Path
 ) -> None:
     other = replace(found[0], job=replace(found[0].job, calibration="found:my.yaml", found_in="my.yaml"))
-    content = document((found[0], other), {})
+    content = document(map(record_of, (found[0], other)), {})
     for part in ("rows", "cases", "timings", "summary"):
         told = [item["calibration"] for item in content[part]]
         assert told == ["true"] * (len(told) // 2) + ["found"] * (len(told) // 2) and told
@@ -140,16 +141,13 @@ def test_timings_are_rows_of_the_same_shape(content: dict[str, list[dict[str, ob
 
 
 def test_the_files_hold_the_same_as_the_document(found: tuple[JobResult, ...], tmp_path: Path) -> None:
-    content = write(found, tmp_path, {"python": "test"})
-    assert json.loads((tmp_path / "result.json").read_text(encoding="utf-8")) == json.loads(
-        json.dumps(content, allow_nan=False)
-    )
+    write(found, tmp_path, {"python": "test"})
+    content = json.loads((tmp_path / "result.json").read_text(encoding="utf-8"))
+    assert content == document(map(record_of, found), {"python": "test"})
     for table, metric in (("pairs", "tpr"), ("frames", "coverage.raw")):
         rows = list(csv.DictReader(io.StringIO((tmp_path / f"{table}.csv").read_text(encoding="utf-8"))))
         counted = sum(
-            row["n"]  # type: ignore[misc]
-            for row in content["rows"]
-            if row["metric"] == metric and row["value"] is not None
+            row["n"] for row in content["rows"] if row["metric"] == metric and row["value"] is not None
         )
         assert len(rows) == counted
     for result in found:

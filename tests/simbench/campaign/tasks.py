@@ -75,10 +75,11 @@ def odd(task: tuple[str, str]) -> str:
 
 def drive(job: Job) -> str:
     """The rows of a real recording, all pipelines."""
-    from simbench.results import document
+    from simbench.result_file import document
+    from simbench.results import record_of
     from simbench.run import run_job
 
-    content = document([run_job(job)], {})
+    content = document([record_of(run_job(job))], {})
     return json.dumps({name: content[name] for name in ("rows", "cases")}, allow_nan=False)
 
 

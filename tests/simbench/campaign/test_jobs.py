@@ -10,7 +10,8 @@ from scenarios.errors import BadInput
 from scenarios.load import load_scenario
 from simbench.campaign.jobs import run_jobs
 from simbench.case import Job, JobResult
-from simbench.results import document
+from simbench.result_file import document
+from simbench.results import record_of
 from tests.simbench.cheats import named
 from tests.simbench.support import write_scenario
 
@@ -44,7 +45,7 @@ def jobs(tmp_path_factory: pytest.TempPathFactory) -> list[Job]:
 
 
 def text(results: tuple[JobResult, ...]) -> str:
-    content = document(results, {})
+    content = document(map(record_of, results), {})
     assert content.pop("timings")
     return json.dumps(content, allow_nan=False)
 

@@ -55,6 +55,29 @@ def test_identical_outputs_with_two_runs_pass_where_other_two_runs_are_an_illust
     assert "illustration" in gate(other, "baseline", "precision").note
 
 
+def test_twenty_scenarios_that_differ_in_nothing_else_are_judged_as_a_sample() -> None:
+    def many(scenarios: int, by: float, worst: int | None = None) -> Side:
+        groups = {}
+        for i in range(scenarios):
+            change = by - 0.3 * (i == worst) + 0.01 * (i % 3 - 1)
+            groups[f"clean/s{i}/car/none/robust"] = runs([0.8 + 0.01 * k + change for k in range(3)])
+        return side({**groups, "other/s0/car/none/robust": runs(OLD if by == 0.0 else moved(0.0))})
+
+    def judged(new: Side, old: Side) -> dict[str, Gate]:
+        return {g.group: g for g in answer(new, old).gates if g.kind == "baseline"}
+
+    few = judged(many(19, 0.001), many(19, 0.0))  # each scenario by itself, with 3 runs
+    assert len(few) == 20 and [g.outcome for g in few.values()].count("INCONCLUSIVE") == 19
+    found = judged(many(20, 0.001), many(20, 0.0))
+    assert set(found) == {"clean/20 scenarios/car/none/robust", "other/s0/car/none/robust"}
+    assert {g.outcome for g in found.values()} == {"PASS"}
+    assert found["clean/20 scenarios/car/none/robust"].n == 60
+    assert judged(many(20, -0.1), many(20, 0.0))["clean/20 scenarios/car/none/robust"].outcome == "REGRESSION"
+    spoiled = judged(many(20, 0.001, worst=7), many(20, 0.0))["clean/20 scenarios/car/none/robust"]
+    assert spoiled.worst_group == "clean/s7/car/none/robust" and spoiled.worst in (0, 1, 2)
+    assert any("sample" in note for note in answer(many(20, 0.001), many(20, 0.0)).notes)
+
+
 def test_a_run_that_lost_its_value_is_an_error_and_never_left_out() -> None:
     found = answer(side([*OLD[:-1], None]), side(OLD))
     assert (found.outcome, found.exit_code) == ("ERROR", 1)
@@ -116,7 +139,7 @@ def test_a_changed_bench_is_an_error_that_names_what_changed_unless_it_is_allowe
     )
     allowed = answer(new, old, Asked(changed=True))
     assert allowed.outcome == "PASS"
-    assert allowed.notes == ("Compared all the same: the bench changed since the baseline: simbench 1 → 2.",)
+    assert allowed.notes[0] == "Compared all the same: the bench changed since the baseline: simbench 1 → 2."
 
 
 def test_a_changed_scenario_or_metric_is_an_error_too() -> None:
@@ -133,7 +156,7 @@ def test_a_group_that_one_side_lacks_is_an_error() -> None:
     assert answer(two, side(OLD)).exit_code == 3
     assert answer(side(OLD), two).exit_code == 3
     assert answer(side(OLD, whole=False), two).outcome == "PASS"
-    assert answer(side(OLD, whole=False), two).notes == ("1 groups of the baseline were not run.",)
+    assert answer(side(OLD, whole=False), two).notes[-1] == "1 groups of the baseline were not run."
 
 
 def test_a_metric_that_the_baseline_has_not_is_an_error() -> None:

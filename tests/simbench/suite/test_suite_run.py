@@ -12,9 +12,11 @@ from xml.etree import ElementTree
 import pytest
 
 from scenarios.errors import BadInput
+from simbench.suite import command as suite_command
 from simbench.suite import run as suite_run
 from simbench.suite.command import Request, run_suite
 from simbench.suite.compare import compare_runs, plan_runs, save_baseline
+from simbench.suite.plan import recordings_of
 
 SUITE = """\
 name: gate
@@ -126,6 +128,14 @@ def test_a_crash_is_told_and_the_rest_goes_on(
     assert {case["status"] for case in good} == {"ok"}
     with pytest.raises(BadInput, match="was run in part"):
         save_baseline(tmp_path / "out", tmp_path / "base.json")
+
+
+def test_a_case_that_was_meant_and_has_no_result_is_told_and_never_left_out(ask: Callable[..., int]) -> None:
+    with (
+        mock.patch.object(suite_command, "recordings_of", lambda cases: recordings_of(cases)[1:]),
+        pytest.raises(RuntimeError, match="1 cases were meant and have no result"),
+    ):
+        ask(seeds=(0,))
 
 
 def test_resume_repeats_nothing_and_lf_only_what_failed(ask: Callable[..., int], tmp_path: Path) -> None:
