@@ -30,14 +30,19 @@ def coverage(groups: Sequence[Group]) -> Coverage:
     """Of all groups; a drive that two pipelines share counts once."""
     runs: dict[tuple[str, str], int] = {}
     seen = set()
+    drives: dict[tuple[object, ...], tuple[str, ...]] = {}  # one that many blocks play is read once
     for group in groups:
         drive = (group.block, group.scenario, group.job.system, group.faults)
         if drive in seen:
             continue
         seen.add(drive)
-        family = load_scenario(group.job.scenario, group.job.changes)
-        found = faults_of(group.job, family, family.resolve(group.seeds[0]))
-        for name in [spec.name for spec in found] or [NONE]:
+        job = group.job
+        played = (job.scenario, job.changes, job.system, job.faults, group.seeds[0])
+        if played not in drives:
+            family = load_scenario(job.scenario, job.changes)
+            found = faults_of(job, family, family.resolve(group.seeds[0]))
+            drives[played] = tuple(spec.name for spec in found) or (NONE,)
+        for name in drives[played]:
             key = (group.scenario, name)
             runs[key] = runs.get(key, 0) + len(group.seeds)
     scenarios = tuple(dict.fromkeys(scenario for scenario, _ in runs))
