@@ -1,0 +1,105 @@
+"""Poses of a recorded drive: samples of everything at even times, and what lies between two of them.
+
+Positions go evenly from sample to sample, rotations along the shortest arc (SLERP). At 1 ms apart that errs
+by a dt^2 / 8: about a micrometre at 10 m/s^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float64, Int64
+
+from simbench.truth import PoseSource
+
+STEP_NS = 1_000_000
+BEYOND_NS = 200_000_000  # before the first and after the last time that anything is known of
+EGO = "ego"
+Poses = tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Samples:
+    """Poses of one body at rising times."""
+
+    t_ns: Int64[np.ndarray, " k"]
+    rotation: Float64[np.ndarray, "k 3 3"]
+    translation_m: Float64[np.ndarray, "k 3"]
+
+    def at(self, t_ns: Int64[np.ndarray, " n"]) -> Poses:
+        """ValueError: a time is before the first sample or after the last."""
+        t = np.asarray(t_ns, dtype=np.int64)
+        if len(t) and (t.min() < self.t_ns[0] or t.max() > self.t_ns[-1]):
+            raise ValueError(f"poses are known from {self.t_ns[0]} to {self.t_ns[-1]} ns only")
+        low = np.clip(np.searchsorted(self.t_ns, t, side="right") - 1, 0, len(self.t_ns) - 2)
+        share = (t - self.t_ns[low]) / (self.t_ns[low + 1] - self.t_ns[low])
+        before, after = self.translation_m[low], self.translation_m[low + 1]
+        return _turned(self.rotation[low], self.rotation[low + 1], share), before + share[:, None] * (
+            after - before
+        )
+
+
+class SampledPoses:
+    """The `PoseSource` of a recording. bodies: `ego`, `object ID` and `sensor NAME`."""
+
+    def __init__(self, bodies: Mapping[str, Samples]) -> None:
+        self.bodies = dict(bodies)
+
+    def ego(self, t_ns: Int64[np.ndarray, " n"]) -> Poses:
+        """T_world_ego."""
+        return self.bodies[EGO].at(t_ns)
+
+    def object_centre(self, object_id: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:
+        """T_world_box. KeyError: no such object."""
+        return self.bodies[object_name(object_id)].at(t_ns)
+
+    def sensor(self, sensor: str, t_ns: Int64[np.ndarray, " n"]) -> Poses:
+        """T_world_sensor. KeyError: no such sensor."""
+        return self.bodies[sensor_name(sensor)].at(t_ns)
+
+
+def sampled(
+    poses: PoseSource, object_ids: Iterable[int], sensors: Iterable[str], first_ns: int, last_ns: int
+) -> dict[str, Samples]:
+    """Everything from before the first to after the last time. What stands still has two samples."""
+    t_ns = np.arange(first_ns - BEYOND_NS, last_ns + BEYOND_NS + STEP_NS, STEP_NS, dtype=np.int64)
+    found = {EGO: poses.ego(t_ns)}
+    found |= {object_name(i): poses.object_centre(i, t_ns) for i in object_ids}
+    found |= {sensor_name(name): poses.sensor(name, t_ns) for name in sensors}
+    return {name: _kept(t_ns, *pose) for name, pose in found.items()}
+
+
+def object_name(object_id: int) -> str:
+    """What a body is called."""
+    return f"object {object_id}"
+
+
+def sensor_name(sensor: str) -> str:
+    """What a sensor's body is called."""
+    return f"sensor {sensor}"
+
+
+def _kept(
+    t_ns: Int64[np.ndarray, " k"],
+    rotation: Float64[np.ndarray, "k 3 3"],
+    position: Float64[np.ndarray, "k 3"],
+) -> Samples:
+    still = bool((rotation == rotation[:1]).all() and (position == position[:1]).all())
+    rows = np.array([0, -1]) if still else slice(None)
+    return Samples(t_ns=t_ns[rows], rotation=rotation[rows], translation_m=position[rows])
+
+
+def _turned(
+    before: Float64[np.ndarray, "n 3 3"],
+    after: Float64[np.ndarray, "n 3 3"],
+    share: Float64[np.ndarray, " n"],
+) -> Float64[np.ndarray, "n 3 3"]:
+    from scipy.spatial.transform import Rotation  # scipy.spatial takes a while to import
+
+    if not len(before):
+        return before
+    step = Rotation.from_matrix(before.transpose(0, 2, 1) @ after).as_rotvec()
+    part: np.ndarray = before @ Rotation.from_rotvec(share[:, None] * step).as_matrix()
+    return part

@@ -1,0 +1,201 @@
+"""A recording on disk: a folder with what a pipeline may see and, apart from it, the truth.
+
+    recording.json   what it is, how it was made, counts and hashes; `complete` only when all was written
+    messages.mcap    calibration and categories, then every message in order of arrival
+    truth.mcap       objects, poses, reference; per scan and image what really happened
+
+Both MCAP files hold frames (`isolate/frames.py`, the same as a pipeline in a process of its own is told).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from fusion.messages import Measurement
+from scenarios.errors import BadInput, Where
+from scenarios.scenario import Spec
+from scenarios.validate import validate
+from simbench.files import prepare_folder, write_text
+from simbench.formats.container import CutOff, Entry, LogWriter, read_log
+from simbench.formats.truth_frames import read_truth, truth_frames
+from simbench.isolate.frames import HEAD, Frame, FrameError, pack, sizes, unpack
+from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
+from simbench.recording import Recording
+
+SCHEMA = "simbench-recording/1"
+ENCODING = "simbench-frame/1"
+MANIFEST, MESSAGES, TRUTH = "recording.json", "messages.mcap", "truth.mcap"
+LONGEST_MANIFEST = 1_000_000
+Word = Annotated[str, Field(max_length=4000)]
+
+
+class Part(Spec):
+    """One of the two files. sha256: of the hashes of its messages, in their order."""
+
+    count: Annotated[int, Field(ge=0)]
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+    topics: Mapping[Word, Annotated[int, Field(ge=1)]]
+
+
+class Manifest(Spec):
+    """What a recording says of itself. command: the line that makes it again."""
+
+    complete: bool
+    command: Word
+    simbench: Word
+    scenario: Word
+    messages: Part | None = None
+    truth: Part | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stored:
+    """What was read. missing: what of it is not there, in sentences; empty: nothing, all hashes are right."""
+
+    manifest: Manifest
+    recording: Recording
+    missing: tuple[str, ...]
+
+    @property
+    def status(self) -> Literal["COMPLETE", "INCOMPLETE"]:
+        return "INCOMPLETE" if self.missing else "COMPLETE"
+
+
+def write_recording(recording: Recording, folder: Path, *, command: str, scenario: str) -> Manifest:
+    """Write a recording into a folder that holds none. BadInput: it holds one, or cannot be written."""
+    from importlib.metadata import version
+
+    prepare_folder(folder)
+    if (folder / MANIFEST).exists():
+        raise BadInput("holds a recording already", file=str(folder))
+    begun = Manifest(complete=False, command=command, simbench=version("simbench"), scenario=scenario)
+    _write_manifest(begun, folder)
+    try:
+        messages = _write(folder / MESSAGES, _messages(recording))
+        truth = _write(folder / TRUTH, _truth(recording))
+    except OSError as error:
+        raise BadInput(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
+    done = begun.model_copy(update={"complete": True, "messages": messages, "truth": truth})
+    _write_manifest(done, folder)
+    return done
+
+
+def read_recording(folder: Path) -> Stored:
+    """A recording from its folder. One that was cut off is read up to there, and `missing` says so. BadInput:
+    there is none, or what is there is damaged."""
+    manifest = read_manifest(folder)
+    missing = [] if manifest.complete else ["recording.json: writing was not completed"]
+    messages, why = _read(folder / MESSAGES, manifest.messages)
+    missing += why
+    truth, why = _read(folder / TRUTH, manifest.truth)
+    missing += why
+    if not messages or messages[0].kind != "reset":
+        raise BadInput("does not begin with a calibration", file=str(folder / MESSAGES))
+    try:
+        calibration, categories = read_reset(messages[0])
+        told = tuple(read_message(frame) for frame in messages[1:])
+    except FrameError as error:
+        raise BadInput(f"is malformed: {error}", file=str(folder / MESSAGES)) from None
+    try:
+        really = read_truth(iter(truth))
+    except FrameError as error:
+        raise BadInput(f"is malformed: {error}", file=str(folder / TRUTH)) from None
+    recording = Recording(calibration=calibration, categories=categories, messages=told, truth=really)
+    return Stored(manifest=manifest, recording=recording, missing=tuple(missing))
+
+
+def read_manifest(folder: Path) -> Manifest:
+    """What a folder's recording says of itself. BadInput: there is none, or it is malformed."""
+    path = folder / MANIFEST
+    try:
+        if path.stat().st_size > LONGEST_MANIFEST:
+            raise BadInput(f"is larger than {LONGEST_MANIFEST} bytes", file=str(path))
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadInput(f"holds no {MANIFEST}: no recording lies there", file=str(folder)) from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise BadInput(f"is no JSON that can be read: {error}", file=str(path)) from None
+    if not isinstance(data, dict) or data.get("schema") != SCHEMA:
+        found = data.get("schema") if isinstance(data, dict) else None
+        raise BadInput(f"is no recording: its schema is {str(found)[:60]!r}", file=str(path), allowed=SCHEMA)
+    return validate(Manifest, {k: v for k, v in data.items() if k != "schema"}, Where(file=str(path)))
+
+
+def _write_manifest(manifest: Manifest, folder: Path) -> None:
+    content = {"schema": SCHEMA, **manifest.model_dump(mode="json")}
+    write_text(folder / MANIFEST, json.dumps(content, indent=1) + "\n")
+
+
+def _messages(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:
+    """Topic, arrival, claimed stamp and frame."""
+    first_ns = recording.messages[0].arrival_ns if recording.messages else 0
+    yield "/calibration", first_ns, first_ns, reset_frame(recording.calibration, recording.categories)
+    for message in recording.messages:
+        frame = message_frame(message)
+        yield f"/{message.sensor}/{frame.kind}", message.arrival_ns, message.stamp_ns, frame
+
+
+def _truth(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:
+    for topic, t_ns, frame in truth_frames(recording.truth):
+        yield topic, t_ns, t_ns, frame
+
+
+def _write(path: Path, frames: Iterator[tuple[str, int, int, Frame]]) -> Part:
+    """Times before 0 are written as 0 in the index; frames hold the true ones."""
+    counts: dict[str, int] = {}
+    with LogWriter(path, encoding=ENCODING, describe=_described) as log:
+        for topic, log_ns, publish_ns, frame in frames:
+            seq = counts.get(topic, 0)
+            log.add(
+                Entry(
+                    topic=topic,
+                    log_ns=max(log_ns, 0),
+                    publish_ns=max(publish_ns, 0),
+                    seq=seq,
+                    data=pack(frame),
+                )
+            )
+            counts[topic] = seq + 1
+        total = log.close()
+    return Part(count=sum(counts.values()), sha256=total, topics=counts)
+
+
+def _described(topic: str) -> tuple[str, str]:
+    return f"simbench/{topic.rpartition('/')[2]}", "SHA-256 (32 bytes), then a frame: see docs/formats.md"
+
+
+def _read(path: Path, part: Part | None) -> tuple[list[Frame], list[str]]:
+    """All frames, and what is missing. BadInput: the file is damaged, or another than the manifest says."""
+    frames, total = list[Frame](), hashlib.sha256()
+    try:
+        for entry in read_log(path, encoding=ENCODING):
+            total.update(entry.digest)
+            frames.append(_frame(entry, path))
+    except CutOff:
+        of = "" if part is None else f" of {part.count}"
+        return frames, [f"{path.name}: it is cut off after {len(frames)}{of} messages"]
+    if part is not None and total.hexdigest() != part.sha256:
+        raise BadInput(f"is not the file that {MANIFEST} tells of: its hash is another", file=str(path))
+    return frames, []
+
+
+def _frame(entry: Entry, path: Path) -> Frame:
+    try:
+        header, body = sizes(entry.data[: HEAD.size])
+        if HEAD.size + header + body != len(entry.data):
+            raise FrameError(f"a frame of {HEAD.size + header + body} bytes stands in {len(entry.data)}")
+        return unpack(entry.data[HEAD.size : HEAD.size + header], entry.data[HEAD.size + header :])
+    except (FrameError, ValueError, OverflowError) as error:
+        raise BadInput(f"{entry.topic}, message {entry.seq}: {error}", file=str(path)) from None
+
+
+def same_message(one: Measurement, other: Measurement) -> bool:
+    """Whether two messages are equal bit by bit."""
+    return pack(message_frame(one)) == pack(message_frame(other))
