@@ -17,6 +17,7 @@ from simbench.commands.describe import describe, list_
 from simbench.commands.doctor import doctor, learn
 from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
+from simbench.commands.generate import generate, verify
 from simbench.commands.init import init
 from simbench.commands.run import demo, run
 from simbench.commands.score import score
@@ -66,7 +67,7 @@ def main() -> None:
 
 
 for verb in (
-    baseline, calibrate, check, compare, demo, describe, doctor, explain, frontier, init, learn, list_, plan,
-    run, score, stress, timeline,
+    baseline, calibrate, check, compare, demo, describe, doctor, explain, frontier, generate, init, learn,
+    list_, plan, run, score, stress, timeline, verify,
 ):  # fmt: skip
     main.add_command(verb)

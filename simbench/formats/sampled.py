@@ -22,7 +22,7 @@ Poses = tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """Poses of one body at rising times."""
+    """Poses of one body at rising times. At these they are exact."""
 
     t_ns: Int64[np.ndarray, " k"]
     rotation: Float64[np.ndarray, "k 3 3"]
@@ -33,12 +33,14 @@ class Samples:
         t = np.asarray(t_ns, dtype=np.int64)
         if len(t) and (t.min() < self.t_ns[0] or t.max() > self.t_ns[-1]):
             raise ValueError(f"poses are known from {self.t_ns[0]} to {self.t_ns[-1]} ns only")
-        low = np.clip(np.searchsorted(self.t_ns, t, side="right") - 1, 0, len(self.t_ns) - 2)
-        share = (t - self.t_ns[low]) / (self.t_ns[low + 1] - self.t_ns[low])
-        before, after = self.translation_m[low], self.translation_m[low + 1]
-        return _turned(self.rotation[low], self.rotation[low + 1], share), before + share[:, None] * (
-            after - before
-        )
+        low = np.searchsorted(self.t_ns, t, side="right") - 1
+        high = np.minimum(low + 1, len(self.t_ns) - 1)
+        share = (t - self.t_ns[low]) / np.maximum(self.t_ns[high] - self.t_ns[low], 1)
+        before, after = self.translation_m[low], self.translation_m[high]
+        exact = share == 0.0  # not even the sign of a zero may change
+        position = np.where(exact[:, None], before, before + share[:, None] * (after - before))
+        turned = _turned(self.rotation[low], self.rotation[high], share)
+        return np.where(exact[:, None, None], self.rotation[low], turned), position
 
 
 class SampledPoses:

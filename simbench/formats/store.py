@@ -13,12 +13,12 @@ import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field
 
-from fusion.messages import Measurement
 from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
@@ -44,13 +44,23 @@ class Part(Spec):
     topics: Mapping[Word, Annotated[int, Field(ge=1)]]
 
 
+class Source(Spec):
+    """What was recorded, in the words of `simbench generate`."""
+
+    scenario: Word
+    system: Word
+    seed: Annotated[int, Field(ge=0)]
+    faults: tuple[Word, ...] = ()
+    changes: tuple[Word, ...] = ()
+    images: Literal["none", "raycast"] = "none"
+
+
 class Manifest(Spec):
-    """What a recording says of itself. command: the line that makes it again."""
+    """What a recording says of itself. simbench: the version that wrote it."""
 
     complete: bool
-    command: Word
     simbench: Word
-    scenario: Word
+    source: Source
     messages: Part | None = None
     truth: Part | None = None
 
@@ -68,14 +78,14 @@ class Stored:
         return "INCOMPLETE" if self.missing else "COMPLETE"
 
 
-def write_recording(recording: Recording, folder: Path, *, command: str, scenario: str) -> Manifest:
+def write_recording(recording: Recording, folder: Path, source: Source) -> Manifest:
     """Write a recording into a folder that holds none. BadInput: it holds one, or cannot be written."""
     from importlib.metadata import version
 
     prepare_folder(folder)
     if (folder / MANIFEST).exists():
         raise BadInput("holds a recording already", file=str(folder))
-    begun = Manifest(complete=False, command=command, simbench=version("simbench"), scenario=scenario)
+    begun = Manifest(complete=False, simbench=version("simbench"), source=source)
     _write_manifest(begun, folder)
     try:
         messages = _write(folder / MESSAGES, _messages(recording))
@@ -196,6 +206,12 @@ def _frame(entry: Entry, path: Path) -> Frame:
         raise BadInput(f"{entry.topic}, message {entry.seq}: {error}", file=str(path)) from None
 
 
-def same_message(one: Measurement, other: Measurement) -> bool:
-    """Whether two messages are equal bit by bit."""
-    return pack(message_frame(one)) == pack(message_frame(other))
+def first_difference(stored: Recording, again: Recording) -> str | None:
+    """Where two recordings differ first, in words; None: all frames of both are equal bit by bit."""
+    for what, frames in (("message", _messages), ("truth", _truth)):
+        for number, (one, other) in enumerate(zip_longest(frames(stored), frames(again))):
+            if one is None or other is None:
+                return f"{what} {number}: only one of both has it"
+            if pack(one[3]) != pack(other[3]):
+                return f"{what} {number}, {one[0]} at {one[1]} ns"
+    return None

@@ -5,17 +5,28 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fusion.messages import LidarScan
 from scenarios.errors import BadInput
 from simbench.case import Job
-from simbench.formats.store import MANIFEST, MESSAGES, TRUTH, read_recording, same_message, write_recording
+from simbench.formats.store import (
+    MANIFEST,
+    MESSAGES,
+    TRUTH,
+    Source,
+    first_difference,
+    read_recording,
+    write_recording,
+)
 from simbench.recording import Recording
 from simbench.run import Made, recording_of, run_case
 
+SOURCE = Source(scenario="overtake-approach", system="car", seed=0)
 CLOSE = {"abs": 1e-6, "rel": 1e-6}
 
 
@@ -31,7 +42,7 @@ def made() -> Made:
 @pytest.fixture(scope="module")
 def original(made: Made, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("store") / "rec"
-    write_recording(made.recording, folder, command="simbench generate x", scenario="overtake-approach")
+    write_recording(made.recording, folder, SOURCE)
     return folder
 
 
@@ -58,7 +69,7 @@ def test_messages_and_truth_come_back_bit_by_bit(made: Made, stored: Path) -> No
     assert (read.status, read.missing, read.manifest.complete) == ("COMPLETE", (), True)
     was, now = made.recording, read.recording
     assert len(was.messages) == len(now.messages)
-    assert all(map(same_message, was.messages, now.messages))
+    assert first_difference(was, replace(now, truth=was.truth)) is None
     for name in ("objects", "target_id", "scans", "images", "reference", "period_ns", "targets"):
         mine, theirs = getattr(was.truth, name), getattr(now.truth, name)
         if name == "images":
@@ -96,7 +107,17 @@ def test_poses_between_the_samples_are_the_true_ones(made: Made, stored: Path) -
 
 def test_a_place_that_holds_a_recording_is_not_written_over(made: Made, stored: Path) -> None:
     with pytest.raises(BadInput, match="holds a recording already"):
-        write_recording(made.recording, stored, command="", scenario="")
+        write_recording(made.recording, stored, SOURCE)
+
+
+def test_the_first_message_that_differs_is_named(made: Made) -> None:
+    was = made.recording
+    scan = next(m for m in was.messages if isinstance(m, LidarScan) and m.seq == 3)
+    moved = replace(scan, intensity=scan.intensity + np.float32(1e-7))
+    now = replace(was, messages=tuple(moved if m is scan else m for m in was.messages))
+    where = first_difference(was, now)
+    assert where is not None and where.endswith(f"/lidar/lidar_scan at {scan.arrival_ns} ns")
+    assert first_difference(was, replace(was, messages=was.messages[:-1])) is not None
 
 
 @pytest.mark.parametrize("name", [MESSAGES, TRUTH])

@@ -1,0 +1,25 @@
+"""`simbench verify`: is a recording whole, and what was written; made again, is it the same?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from simbench.formats.store import first_difference, read_recording
+from simbench.generate.work import job_of
+from simbench.run import recording_of
+
+
+def verified(folder: Path, *, rerun: bool) -> tuple[str, bool]:
+    """A sentence, and whether all is well. BadInput: no recording lies there, or it is damaged."""
+    stored = read_recording(folder)
+    if stored.missing:
+        return f"{folder}: INCOMPLETE: {'; '.join(stored.missing)}", False
+    part = stored.manifest.messages
+    count = 0 if part is None else part.count
+    if not rerun:
+        return f"{folder}: complete, {count} messages, all hashes right", True
+    again = recording_of(job_of(stored.manifest.source))[2].recording
+    where = first_difference(stored.recording, again)
+    if where is not None:
+        return f"{folder}: not the same when it is made again: {where}", False
+    return f"{folder}: complete, {count} messages, the same bytes when made again", True

@@ -1,0 +1,149 @@
+"""Recordings made into a data set: proved, resumed, verified; and what happens when something is wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from unittest import mock
+
+import pytest
+
+from scenarios.errors import BadInput
+from simbench.case import Job
+from simbench.formats.store import MANIFEST, MESSAGES
+from simbench.generate import command, work
+from simbench.generate.command import NAME, generate_recordings
+from simbench.generate.verify import verified
+from simbench.run import Made, recording_of
+
+FIRST = "overtake-approach-car-0000"
+
+
+def ask(out: Path, seeds: tuple[int, ...] = (0, 1), workers: int = 1, **more: object) -> int:
+    asked = {"targets": ["overtake-approach"], "system": "car", "faults": ("timing.trigger_offset_ms=50",)}
+    asked |= {"changes": ("systems.car.duration_s=0.6",), "images": "none"} | more
+    return generate_recordings(seeds=seeds, workers=workers, out=out, **asked)  # type: ignore[arg-type]
+
+
+@pytest.fixture(scope="module")
+def original(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("generate") / "set"
+    assert ask(out) == 0
+    return out
+
+
+@pytest.fixture
+def made(original: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(original, tmp_path / "set"))
+
+
+def rows(out: Path) -> list[dict[str, object]]:
+    content = json.loads((out / NAME).read_text(encoding="utf-8"))
+    return list(content["recordings"])
+
+
+def test_every_recording_has_a_folder_that_is_whole(made: Path) -> None:
+    assert [row["name"] for row in rows(made)] == [FIRST, "overtake-approach-car-0001"]
+    for row in rows(made):
+        assert row["status"] == "ok"
+        sentence, whole = verified(made / str(row["name"]), rerun=False)
+        assert whole and f"complete, {row['messages']} messages" in sentence
+    assert {path.name for path in made.iterdir() if path.is_dir()} == {str(row["name"]) for row in rows(made)}
+
+
+def test_two_workers_write_the_same_bytes_as_one(made: Path, tmp_path: Path) -> None:
+    assert ask(tmp_path / "two", workers=2) == 0
+    assert rows(tmp_path / "two") == rows(made)
+    for row in rows(made):
+        for path in (made / str(row["name"])).iterdir():
+            assert path.read_bytes() == (tmp_path / "two" / str(row["name"]) / path.name).read_bytes()
+
+
+def test_what_is_there_is_not_made_again_and_what_a_killed_worker_left_is_in_nobodys_way(made: Path) -> None:
+    honest, seen = work.recording_of, list[int]()
+
+    def counted(job: Job) -> object:
+        seen.append(job.seed)
+        return honest(job)
+
+    (made / ".overtake-approach-car-0002").mkdir()
+    (made / ".overtake-approach-car-0002" / MANIFEST).write_text("{}", encoding="utf-8")
+    with mock.patch.object(work, "recording_of", counted):
+        assert ask(made, seeds=(0, 1, 2)) == 0
+    assert seen == [2]
+    assert len(rows(made)) == 3 and not list(made.glob(".overtake*"))
+
+
+def test_a_recording_that_was_made_and_is_gone_is_told(made: Path) -> None:
+    shutil.rmtree(made / FIRST)
+    with pytest.raises(BadInput, match="was made and is gone"):
+        ask(made)
+
+
+def test_an_error_that_did_not_take_effect_is_not_kept(tmp_path: Path) -> None:
+    def lying(job: Job) -> tuple[object, object, Made]:
+        scenario, faults, made = recording_of(job)
+        return scenario, faults, replace(made, receipts=tuple(map(spoil, made.receipts)))
+
+    def spoil(receipt: object) -> object:
+        return replace(receipt, status="mismatch")  # type: ignore[type-var]
+
+    with mock.patch.object(work, "recording_of", lying):
+        assert ask(tmp_path, seeds=(0,)) == 3
+    (row,) = rows(tmp_path)
+    assert row["status"] == "receipt_mismatch" and "timing.trigger_offset_ms" in str(row["why"])
+    assert not (tmp_path / FIRST).exists()
+
+
+def test_a_full_disk_is_said_before_anything_is_made(tmp_path: Path) -> None:
+    little = SimpleNamespace(free=5_000_000)
+    with (
+        mock.patch("simbench.generate.disk.shutil.disk_usage", return_value=little),
+        pytest.raises(BadInput, match=r"take about 0\.\d+ GB, and 0\.01 GB are free"),
+    ):
+        ask(tmp_path, seeds=tuple(range(20)))
+    assert not [path for path in tmp_path.iterdir() if path.is_dir()]
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"targets": ["overtake-approach", "overtake-approach"]}, "two recordings would be called"),
+        ({"targets": ["overtake-aproach"]}, "did you mean"),
+        ({"faults": ("timing.trigger_offset_ms=nan",)}, "trigger_offset"),
+    ],
+)
+def test_bad_input_costs_one_sentence_and_writes_nothing(
+    tmp_path: Path, change: dict[str, object], says: str
+) -> None:
+    with pytest.raises(BadInput, match=says):
+        ask(tmp_path / "set", **change)
+    assert not (tmp_path / "set").exists()
+
+
+def test_a_recording_that_was_cut_off_is_incomplete(made: Path) -> None:
+    path = made / FIRST / MESSAGES
+    path.write_bytes(path.read_bytes()[:-100])
+    sentence, whole = verified(made / FIRST, rerun=False)
+    assert not whole and "INCOMPLETE: messages.mcap: it is cut off after" in sentence
+
+
+def test_made_again_it_is_the_same_or_the_first_difference_is_named(made: Path) -> None:
+    sentence, whole = verified(made / FIRST, rerun=True)
+    assert whole and "the same bytes when made again" in sentence
+    path = made / FIRST / MANIFEST
+    data = json.loads(path.read_text(encoding="utf-8"))
+    data["source"]["seed"] = 5
+    path.write_text(json.dumps(data), encoding="utf-8")
+    sentence, whole = verified(made / FIRST, rerun=True)
+    assert not whole and "not the same when it is made again: message" in sentence
+
+
+def test_progress_says_size_and_time(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    progress: Callable[..., None] = command._Progress(total=2).say
+    progress(work.Row(name="a", status="ok", size_bytes=2_500_000, seconds=(1.0, 0.5)))
+    assert "[1/2] a: ok, 2.5 MB, 1.0 s to make, 0.5 s to write" in capsys.readouterr().err
