@@ -6,7 +6,7 @@ A `Job` makes one recording and runs every pipeline on it: a case is a job and a
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -128,8 +128,8 @@ def judge(
     views = pair_views(made.recording, driven)
     curves = distances(made.recording, driven, others)
     clock.lap("oracle and views")
-    bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
-    return tuple(spoiled(case, bad) if bad else case for case in cases), views, curves
+    why = mismatch(made.receipts)
+    return tuple(spoiled(case, why) if why else case for case in cases), views, curves
 
 
 @runtime_checkable
@@ -171,10 +171,15 @@ def _driven_apart(name: str, recording: Recording, limits: Limits) -> Driven | C
         return failed(name, "pipeline_error", str(error))
 
 
-def spoiled(case: Case, bad: list[Receipt]) -> Case:
+def mismatch(receipts: Iterable[Receipt]) -> str | None:
+    """Which receipts do not match, in a sentence; None: all do."""
+    names = ", ".join(f"{r.fault} {r.quantity}" for r in receipts if r.status == MISMATCH)
+    return f"receipt does not match: {names}" if names else None
+
+
+def spoiled(case: Case, why: str) -> Case:
     """A receipt that does not match makes every number of the recording void."""
-    names = ", ".join(f"{r.fault} {r.quantity}" for r in bad)
-    return failed(case.pipeline, "receipt_mismatch", f"receipt does not match: {names}")
+    return failed(case.pipeline, "receipt_mismatch", why)
 
 
 class Clock:

@@ -11,12 +11,11 @@ from simbench.drive import Driven
 from simbench.elsewhere.messages import messages_as_bytes
 from simbench.elsewhere.outputs import read_outputs
 from simbench.environment import environment
-from simbench.faults.receipt import MISMATCH
 from simbench.files import prepare_folder, write_bytes
 from simbench.outcome import exit_code
 from simbench.result_file import Record, write_result
 from simbench.results import record_of
-from simbench.run import Made, recording_of, spoiled
+from simbench.run import Made, mismatch, recording_of, spoiled
 from simbench.score.objects import score_objects
 
 MESSAGES = "messages.sbf"
@@ -49,10 +48,10 @@ def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[Rec
 
 def _case(results: Path, made: Made) -> Case:
     outputs, trajectories = read_outputs(results, made.recording)
-    bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
     driven = Driven(outputs=outputs, trajectories=trajectories, scan_ms=(), step_ns={})
     case = scored(results.name, score_objects(made.recording, outputs, trajectories), driven)
-    return spoiled(case, bad) if bad else case
+    why = mismatch(made.receipts)
+    return spoiled(case, why) if why else case
 
 
 def print_rows(record: Record) -> None:

@@ -106,7 +106,7 @@ def read_log(path: Path, *, encoding: str) -> Iterator[Entry]:
     """All messages, chunk by chunk. BadInput: this is no such file, or it is damaged. CutOff: it ends too
     early; what came before is whole."""
     from mcap.exceptions import McapError
-    from mcap.records import Channel, Chunk, Footer, Message, Schema
+    from mcap.records import Channel, Chunk, Footer, Message
     from mcap.stream_reader import StreamReader, breakup_chunk
 
     name = str(path)
@@ -120,12 +120,8 @@ def read_log(path: Path, *, encoding: str) -> Iterator[Entry]:
             reader = StreamReader(bounded, emit_chunks=True, validate_crcs=True, record_size_limit=size)  # type: ignore[arg-type]
             for record in reader.records:
                 ended = ended or isinstance(record, Footer)
-                if isinstance(record, Message | Schema):
-                    if isinstance(record, Message):
-                        raise BadInput(
-                            "has a message outside of a chunk, which no checksum covers", file=name
-                        )
-                    continue
+                if isinstance(record, Message):
+                    raise BadInput("has a message outside of a chunk, which no checksum covers", file=name)
                 if isinstance(record, Channel):
                     channels[record.id] = record
                     continue

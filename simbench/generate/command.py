@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import os
 import sys
-import time
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from shlex import join
 
@@ -23,6 +22,7 @@ from simbench.case import Images, Job
 from simbench.files import prepare_folder, write_text
 from simbench.generate.disk import check_room, estimate_bytes
 from simbench.generate.work import Row, Task, key_of, row_of
+from simbench.progress import Progress
 from simbench.stage import stage
 
 SCHEMA = "simbench-dataset/1"
@@ -36,9 +36,9 @@ def generate_recordings(
     """The exit code: 0 all are there, 3 the bench failed in some. Raises BadInput."""
     jobs = _jobs(targets, system, seeds, faults, changes, images)
     names = [f"{PurePath(job.scenario).stem}-{job.system}-{job.seed:04d}" for job in jobs]
-    twice = next((name for i, name in enumerate(names) if name in names[:i]), None)
-    if twice is not None:
-        raise BadInput(f"two recordings would be called {twice}; make them into two folders")
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise BadInput(f"two recordings would be called {twice[0]}; make them into two folders")
     for job in {(job.scenario, job.system): job for job in jobs}.values():
         stage(job)  # a bad combination costs one sentence and no time
     prepare_folder(out)
@@ -84,13 +84,13 @@ def _made(tasks: Sequence[Task], ledger: Ledger, workers: int, out: Path) -> lis
         needed = estimate_bytes([task.job for task in missing], out)
         click.echo(f"{len(missing)} recordings to make, about {needed / 1e6:.0f} MB", err=True)
         check_room(needed, out)
-    progress = _Progress(total=len(missing))
+    progress = Progress(total=len(missing))
     names = {key_of(task): task.name for task in tasks}
     with open_executor(max(1, min(workers, len(missing))), None) as executor:
         found = [
             _row(names[done.key], done)
             for done in campaign(
-                row_of, tasks, key_of, executor, ledger, lambda d: progress.say(_row(names[d.key], d))
+                row_of, tasks, key_of, executor, ledger, lambda d: progress.say(_told(_row(names[d.key], d)))
             )
         ]
     for row in found:
@@ -122,19 +122,8 @@ def _write(rows: Sequence[Row], tasks: Sequence[Task], out: Path) -> None:
     write_text(out / NAME, json.dumps(content, indent=1, allow_nan=False) + "\n")
 
 
-@dataclass(kw_only=True)
-class _Progress:
-    """A line on stderr for every recording, with the time left."""
-
-    total: int
-    count: int = 0
-    begun: float = field(default_factory=time.perf_counter)
-
-    def say(self, row: Row) -> None:
-        self.count += 1
-        left_s = (time.perf_counter() - self.begun) / self.count * (self.total - self.count)
-        click.echo(
-            f"[{self.count}/{self.total}] {row.name}: {row.status}, {row.size_bytes / 1e6:.1f} MB, "
-            f"{row.seconds[0]:.1f} s to make, {row.seconds[1]:.1f} s to write ({left_s / 60:.1f} min left)",
-            err=True,
-        )
+def _told(row: Row) -> str:
+    return (
+        f"{row.name}: {row.status}, {row.size_bytes / 1e6:.1f} MB, {row.seconds[0]:.1f} s to make, "
+        f"{row.seconds[1]:.1f} s to write"
+    )

@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from scenarios.errors import BadInput
-from scenarios.load import load_scenario
+from scenarios.load import Family, load_scenario
 from simbench.case import Job
 from simbench.formats.store import write_recording
 from simbench.generate.work import size_of, source_of
@@ -20,14 +20,14 @@ SPARE = 1.2  # of the estimate: drives of a family differ
 
 def estimate_bytes(jobs: Sequence[Job], out: Path) -> int:
     """Of all recordings together. Raises BadInput."""
-    second: dict[tuple[str, tuple[str, ...], str, str], float] = {}
+    drives: dict[tuple[str, tuple[str, ...], str, str], tuple[Family, float]] = {}
     total = 0.0
     for job in jobs:
         drive = (job.scenario, job.changes, job.system, job.images)
-        if drive not in second:
-            second[drive] = _second_bytes(job, out)
-        duration_s = load_scenario(job.scenario, job.changes).resolve(job.seed).system(job.system).duration_s
-        total += duration_s * second[drive]
+        if drive not in drives:
+            drives[drive] = load_scenario(job.scenario, job.changes), _second_bytes(job, out)
+        family, second = drives[drive]
+        total += family.resolve(job.seed).system(job.system).duration_s * second
     return int(total)
 
 

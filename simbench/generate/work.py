@@ -10,9 +10,8 @@ from pathlib import Path
 
 from simbench.campaign.job_key import job_key
 from simbench.case import Job
-from simbench.faults.receipt import MISMATCH
-from simbench.formats.store import Manifest, Source, write_recording
-from simbench.run import recording_of
+from simbench.formats.store import Source, write_recording
+from simbench.run import mismatch, recording_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,21 +46,19 @@ def row_of(task: Task) -> str:
     """Make a recording and write it; its row as JSON text."""
     begun = time.perf_counter()
     _, _, made = recording_of(task.job)
-    bad = [receipt for receipt in made.receipts if receipt.status == MISMATCH]
-    if bad:
-        names = ", ".join(f"{r.fault} {r.quantity}" for r in bad)
-        row = Row(name=task.name, status="receipt_mismatch", why=f"receipt does not match: {names}")
-        return json.dumps(asdict(row))
+    if why := mismatch(made.receipts):
+        return json.dumps(asdict(Row(name=task.name, status="receipt_mismatch", why=why)))
     written = time.perf_counter()
     place, beside = Path(task.out) / task.name, Path(task.out) / f".{task.name}"
     shutil.rmtree(beside, ignore_errors=True)  # what a killed worker left
-    manifest = write_recording(made.recording, beside, source_of(task.job))
+    messages = write_recording(made.recording, beside, source_of(task.job)).messages
+    assert messages is not None  # it is complete
     shutil.rmtree(place, ignore_errors=True)  # made by other code, or the ledger would hold it
     beside.rename(place)
     done = time.perf_counter()
     row = Row(
-        name=task.name, status="ok", size_bytes=size_of(place), messages=_count(manifest),
-        sha256=_hash(manifest), seconds=(written - begun, done - written),
+        name=task.name, status="ok", size_bytes=size_of(place), messages=messages.count,
+        sha256=messages.sha256, seconds=(written - begun, done - written),
     )  # fmt: skip
     return json.dumps(asdict(row))
 
@@ -85,12 +82,3 @@ def job_of(source: Source) -> Job:
 def size_of(folder: Path) -> int:
     """Bytes of the files of a folder."""
     return sum(path.stat().st_size for path in folder.iterdir())
-
-
-def _count(manifest: Manifest) -> int:
-    return 0 if manifest.messages is None else manifest.messages.count
-
-
-def _hash(manifest: Manifest) -> str:
-    """Of the messages, as the manifest tells."""
-    return "" if manifest.messages is None else manifest.messages.sha256

@@ -18,6 +18,7 @@ from simbench.case import Boxes, Job
 from simbench.files import prepare_folder, write_text
 from simbench.isolate.ask import check_pipeline_name
 from simbench.outcome import exit_code
+from simbench.progress import Progress
 from simbench.report.stress_page import at, write_page
 from simbench.stage import stage
 from simbench.stress.axes import parse_axes
@@ -74,16 +75,13 @@ def _measured(
 ) -> int:
     """Measure what is missing, write all; the exit code."""
     fresh = ledger.missing(tasks)
-    begun, told = time.perf_counter(), [0]
+    begun, progress = time.perf_counter(), Progress(total=fresh)
     if fresh < len(tasks):
         click.echo(f"{len(tasks) - fresh} of {len(tasks)} recordings are there already", err=True)
 
     def done(outcomes: tuple[Outcome, ...]) -> None:
-        told[0] += 1
-        left_s = (time.perf_counter() - begun) / told[0] * (fresh - told[0])
         statuses = ", ".join(sorted({outcome.status for outcome in outcomes}))
-        words = f"{at(plan.axes, outcomes[0].point)}, seed {outcomes[0].seed}: {statuses}"
-        click.echo(f"[{told[0]}/{fresh}] {words} ({left_s / 60:.1f} min left)", err=True)
+        progress.say(f"{at(plan.axes, outcomes[0].point)}, seed {outcomes[0].seed}: {statuses}")
 
     unused = len(ledger.rows) - (len(tasks) - fresh)
     if unused:

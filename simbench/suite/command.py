@@ -27,6 +27,7 @@ from simbench.environment import environment
 from simbench.files import prepare_folder
 from simbench.isolate.ask import check_pipeline_name
 from simbench.isolate.limits import DEFAULT, Isolate, Limits
+from simbench.progress import Progress
 from simbench.result_file import Record, print_result, write_result
 from simbench.stage import stage
 from simbench.suite.coverage import coverage
@@ -172,13 +173,13 @@ class _Run:
         missing = sum(key not in self.ledger for key in keys)
         if missing < len(keys):
             click.echo(f"{len(keys) - missing} of {len(keys)} recordings are there already", err=True)
-        progress = _Progress(total=missing)
+        progress = Progress(total=missing)
         workers = max(1, min(self.asked.workers or os.cpu_count() or 1, missing))
         begun = time.perf_counter()
         with open_executor(workers, self.asked.cluster if missing else None) as executor:
             rows = campaign(
                 record_text, recordings, _key, executor, self.ledger,
-                lambda row: progress.say(keys[row.key], row),
+                lambda row: progress.say(_told(keys[row.key], row)),
             )  # fmt: skip
             for row in rows:
                 recording, record = keys[row.key], _record(keys[row.key], row)
@@ -213,20 +214,5 @@ def _key(recording: Recording) -> str:
     return job_key(recording.job, groups=list(recording.groups))
 
 
-@dataclass(kw_only=True)
-class _Progress:
-    """A line on stderr for every recording, with the time left."""
-
-    total: int
-    count: int = 0
-    begun: float = field(default_factory=time.perf_counter)
-
-    def say(self, recording: Recording, row: Done) -> None:
-        self.count += 1
-        left_s = (time.perf_counter() - self.begun) / self.count * (self.total - self.count)
-        name = recording.groups[0].rpartition("/")[0]
-        click.echo(
-            f"[{self.count}/{self.total}] {name} seed {recording.job.seed}: {row.status} "
-            f"({left_s / 60:.1f} min left)",
-            err=True,
-        )
+def _told(recording: Recording, row: Done) -> str:
+    return f"{recording.groups[0].rpartition('/')[0]} seed {recording.job.seed}: {row.status}"

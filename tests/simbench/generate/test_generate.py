@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,7 +15,7 @@ import pytest
 from scenarios.errors import BadInput
 from simbench.case import Job
 from simbench.formats.store import MANIFEST, MESSAGES
-from simbench.generate import command, work
+from simbench.generate import work
 from simbench.generate.command import NAME, generate_recordings
 from simbench.generate.verify import verified
 from simbench.run import Made, recording_of
@@ -143,7 +143,7 @@ def test_made_again_it_is_the_same_or_the_first_difference_is_named(made: Path) 
     assert not whole and "not the same when it is made again: message" in sentence
 
 
-def test_progress_says_size_and_time(made: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    progress: Callable[..., None] = command._Progress(total=2).say
-    progress(work.Row(name="a", status="ok", size_bytes=2_500_000, seconds=(1.0, 0.5)))
-    assert "[1/2] a: ok, 2.5 MB, 1.0 s to make, 0.5 s to write" in capsys.readouterr().err
+def test_progress_says_size_and_time(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert ask(tmp_path, seeds=(0,)) == 0
+    told = re.escape(f"[1/1] {FIRST}: ok, ") + r"\d\.\d MB, .* s to make, .* s to write \(0\.0 min left\)"
+    assert re.search(told, capsys.readouterr().err)
