@@ -24,6 +24,7 @@ from scenarios.errors import BadInput
 CHUNK_BYTES = 2**20
 MOST_CHUNK_BYTES = 512 * 2**20  # one message may be a picture or a long sweep
 DIGEST_BYTES = 32
+MAGIC = b"\x89MCAP0\r\n"  # what every MCAP file begins with
 LIBRARY = "simbench"
 
 
@@ -116,6 +117,10 @@ def read_log(path: Path, *, encoding: str) -> Iterator[Entry]:
     try:
         with path.open("rb") as file:
             size = os.fstat(file.fileno()).st_size
+            begin = file.read(len(MAGIC))
+            if not MAGIC.startswith(begin):
+                raise BadInput("is no MCAP file", file=name)
+            file.seek(0)
             bounded = _Bounded(file, size)
             reader = StreamReader(bounded, emit_chunks=True, validate_crcs=True, record_size_limit=size)  # type: ignore[arg-type]
             for record in reader.records:

@@ -107,7 +107,8 @@ def read_recording(folder: Path) -> Stored:
     truth, why = _read(folder / TRUTH, manifest.truth)
     missing += why
     if not messages or messages[0].kind != "reset":
-        raise BadInput("does not begin with a calibration", file=str(folder / MESSAGES))
+        wrong = "is cut off before its calibration" if not messages else "does not begin with a calibration"
+        raise BadInput(wrong, file=str(folder / MESSAGES))
     try:
         calibration, categories = read_reset(messages[0])
         told = tuple(read_message(frame) for frame in messages[1:])

@@ -160,6 +160,16 @@ def test_a_bad_manifest_is_told_in_one_sentence(stored: Path, text: str, says: s
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.parametrize(
+    ("content", "says"),
+    [(b"garbage", "is no MCAP file"), (b"", "cut off before"), (b"\x89MCAP0\r\n", "cut off before")],
+)
+def test_messages_that_are_none_are_called_what_they_are(stored: Path, content: bytes, says: str) -> None:
+    (stored / MESSAGES).write_bytes(content)
+    with pytest.raises(BadInput, match=says):
+        read_recording(stored)
+
+
 def test_truth_among_the_messages_is_refused(stored: Path) -> None:
     """A file put in the other's place: the truth is no message, and hashes differ."""
     shutil.copy(stored / TRUTH, stored / MESSAGES)
