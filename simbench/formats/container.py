@@ -14,7 +14,7 @@ import hashlib
 import os
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -65,7 +65,7 @@ class LogWriter:
 
         self._file = path.open("wb")
         self._writer = Writer(
-            self._file, chunk_size=chunk_bytes, compression=CompressionType.ZSTD, enable_data_crcs=True
+            self._file, chunk_size=chunk_bytes, compression=CompressionType.LZ4, enable_data_crcs=True
         )
         self._writer.start(profile="", library=LIBRARY)
         self._encoding, self._describe = encoding, describe
@@ -78,19 +78,23 @@ class LogWriter:
     def __exit__(self, *_: object) -> None:
         self._file.close()
 
-    def add(self, entry: Entry) -> None:
-        """Write one message."""
-        if entry.topic not in self._channels:
-            name, text = self._describe(entry.topic)
+    def add(
+        self, topic: str, content: Sequence[bytes | memoryview], *, log_ns: int, publish_ns: int, seq: int
+    ) -> None:
+        """Write one message (see `Entry`), its content in pieces."""
+        if topic not in self._channels:
+            name, text = self._describe(topic)
             schema = self._writer.register_schema(name=name, encoding="", data=text.encode("utf-8"))
-            self._channels[entry.topic] = self._writer.register_channel(
-                topic=entry.topic, message_encoding=self._encoding, schema_id=schema
+            self._channels[topic] = self._writer.register_channel(
+                topic=topic, message_encoding=self._encoding, schema_id=schema
             )
-        digest = entry.digest
-        self._all.update(digest)
+        hashed = hashlib.sha256()
+        for piece in content:
+            hashed.update(piece)
+        self._all.update(hashed.digest())
         self._writer.add_message(
-            channel_id=self._channels[entry.topic], log_time=entry.log_ns, publish_time=entry.publish_ns,
-            sequence=entry.seq, data=digest + entry.data,
+            channel_id=self._channels[topic], log_time=log_ns, publish_time=publish_ns, sequence=seq,
+            data=b"".join((hashed.digest(), *content)),
         )  # fmt: skip
         self._file.flush()  # whole chunks are out of this process, whatever becomes of it
 
@@ -197,15 +201,24 @@ def _decompressed(compression: str, data: bytes, size: int, name: str) -> bytes:
     """Up to one byte more than `size`, whatever the data say of themselves."""
     if compression == "":
         return data
+    if compression == "lz4":
+        import lz4.frame
+
+        try:
+            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
+        except (RuntimeError, EOFError) as error:
+            raise BadInput(f"is damaged: a chunk cannot be unpacked ({_words(error)})", file=name) from None
     if compression != "zstd":
-        raise BadInput(f"has chunks compressed by {compression[:40]!r}", file=name, allowed="zstd or nothing")
+        raise BadInput(
+            f"has chunks compressed by {compression[:40]!r}", file=name, allowed="lz4, zstd or nothing"
+        )
     import zstandard
 
     try:
         with zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data) as stream:
             return bytes(stream.read(size + 1))
     except zstandard.ZstdError as error:
-        raise BadInput(f"is damaged: a chunk cannot be unpacked ({error})", file=name) from None
+        raise BadInput(f"is damaged: a chunk cannot be unpacked ({_words(error)})", file=name) from None
 
 
 class _EndError(Exception):

@@ -25,7 +25,7 @@ from scenarios.validate import validate
 from simbench.files import prepare_folder, write_text
 from simbench.formats.container import CutOff, Entry, LogWriter, read_log
 from simbench.formats.truth_frames import read_truth, truth_frames
-from simbench.isolate.frames import HEAD, Frame, FrameError, pack, sizes, unpack
+from simbench.isolate.frames import HEAD, Frame, FrameError, pack, pieces, sizes, unpack
 from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
 from simbench.recording import Recording
 
@@ -164,15 +164,7 @@ def _write(path: Path, frames: Iterator[tuple[str, int, int, Frame]]) -> Part:
     with LogWriter(path, encoding=ENCODING, describe=_described) as log:
         for topic, log_ns, publish_ns, frame in frames:
             seq = counts.get(topic, 0)
-            log.add(
-                Entry(
-                    topic=topic,
-                    log_ns=max(log_ns, 0),
-                    publish_ns=max(publish_ns, 0),
-                    seq=seq,
-                    data=pack(frame),
-                )
-            )
+            log.add(topic, pieces(frame), log_ns=max(log_ns, 0), publish_ns=max(publish_ns, 0), seq=seq)
             counts[topic] = seq + 1
         total = log.close()
     return Part(count=sum(counts.values()), sha256=total, topics=counts)

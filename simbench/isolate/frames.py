@@ -55,20 +55,25 @@ class Frame:
 
 def pack(frame: Frame) -> bytes:
     """A frame as bytes. FrameError where it would be refused by `unpack`."""
-    specs, parts = [], []
+    return b"".join(pieces(frame))
+
+
+def pieces(frame: Frame) -> list[bytes | memoryview]:
+    """The bytes of a frame, without a copy of its arrays. FrameError as above."""
+    specs, body = [], list[memoryview]()
     for name, array in frame.arrays.items():
         little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
         if little.dtype not in _NAMES:
             raise FrameError(f"'{name}' holds {array.dtype}, which no frame can carry")
         specs.append({"name": name, "dtype": _NAMES[little.dtype], "shape": list(array.shape)})
-        parts.append(little.tobytes())
+        body.append(little.reshape(-1).view(np.uint8).data)
     try:
         text = json.dumps({"kind": frame.kind, **frame.fields, "arrays": specs}, allow_nan=False)
     except (ValueError, TypeError) as error:
         raise FrameError(f"a '{frame.kind}' cannot be written as JSON: {error}") from error
-    header, body = text.encode("utf-8"), b"".join(parts)
-    check_sizes(len(header), len(body))
-    return HEAD.pack(MAGIC, len(header), len(body)) + header + body
+    header, size = text.encode("utf-8"), sum(piece.nbytes for piece in body)
+    check_sizes(len(header), size)
+    return [HEAD.pack(MAGIC, len(header), size) + header, *body]
 
 
 def sizes(head: bytes) -> tuple[int, int]:
