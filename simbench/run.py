@@ -30,8 +30,8 @@ from simbench.recording import Recording
 from simbench.score.contract import ContractError
 from simbench.score.objects import score_objects, score_oracles
 from simbench.score.pairs import frames_and_pairs
-from simbench.sensors.pictures import TakePicture, by_rays
-from simbench.stage import Stage, as_told, pictures, record, stage
+from simbench.sensors.pictures import TakePicture
+from simbench.stage import Stage, as_told, camera_of, pictures, record, stage
 
 
 def run_job(job: Job) -> JobResult:
@@ -76,9 +76,12 @@ def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) 
     return Made(recording=recording, receipts=found, shake=shake)
 
 
-def recording_of(job: Job) -> tuple[Scenario | RecordedScene, FaultSet, Made]:
-    """What a job records, for whoever runs no pipeline here; with pictures by rays (or the recorded ones)
-    unless `images` is `none`. Raises BadInput."""
+def recording_of(
+    job: Job, beside: Callable[[TakePicture], TakePicture] = lambda take: take
+) -> tuple[Scenario | RecordedScene, FaultSet, Made]:
+    """What a job records, for whoever runs no pipeline here; with pictures (or the recorded ones) unless
+    `images` is `none`. `beside` may do something with every picture that is taken. Raises BadInput, and as
+    `stage.camera_of`."""
     if is_recorded(job.scenario):
         played = player_of(job).play(images=job.images != "none")
         return (
@@ -87,8 +90,9 @@ def recording_of(job: Job) -> tuple[Scenario | RecordedScene, FaultSet, Made]:
             Made(recording=played.recording, receipts=played.receipts, shake=""),
         )
     staged = stage(job)
-    picture = None if job.images == "none" else by_rays(staged.rig, job.seed)
-    return staged.scenario, staged.faults, _record(job, staged, picture, Clock())
+    with camera_of(job, staged) as take:
+        picture = None if take is None else beside(take)
+        return staged.scenario, staged.faults, _record(job, staged, picture, Clock())
 
 
 def _guarded(

@@ -126,9 +126,19 @@ def as_told(job: Job, staged: Stage, recording: Recording) -> Recording:
 
 @contextmanager
 def pictures(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
-    """Takes pictures for a job whose pipelines read them, else None. Raises `gl.RenderingUnavailable` for
+    """Takes pictures for a job whose pipelines read them, else None. Raises as `camera_of`."""
+    if not any(reads_images(name) for name in job.pipelines):
+        yield None
+        return
+    with camera_of(job, staged) as picture:
+        yield picture
+
+
+@contextmanager
+def camera_of(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
+    """Takes the pictures that a job asks for, None: it asks for none. Raises `gl.RenderingUnavailable` for
     images by OpenGL where nothing can draw."""
-    if job.images == "none" or not any(reads_images(name) for name in job.pipelines):
+    if job.images == "none":
         yield None
         return
     if job.images == "raycast":

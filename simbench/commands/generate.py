@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 @click.option("--faults", "faults", multiple=True, metavar="NAME|FILE|KEY=VALUE", help="As for run.")
 @click.option("--set", "changes", multiple=True, metavar="PATH=VALUE", help="As for run.")
 @click.option(
-    "--images", type=click.Choice(["none", "raycast"]), default="none", show_default=True,
-    help="Take pictures by rays, or not at all.",
+    "--images", type=click.Choice(["none", "raycast", "gl"]), default="none", show_default=True,
+    help="Pictures by rays (all that the sensor file says), by OpenGL, or none.",
 )  # fmt: skip
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
 @click.option("--out", type=click.Path(path_type=Path), default=Path("out/generate"), show_default=True)

@@ -4,7 +4,8 @@
     messages.mcap    calibration and categories, then every message in order of arrival
     truth.mcap       objects, poses, reference; per scan and image what really happened
 
-Both MCAP files hold frames (`isolate/frames.py`, the same as a pipeline in a process of its own is told).
+Both MCAP files hold frames (`isolate/frames.py`, the same as a pipeline in a process of its own is told, but
+that pictures are PNG).
 """
 
 from __future__ import annotations
@@ -19,11 +20,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fusion.messages import CameraImage, Measurement
 from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
 from simbench.files import prepare_folder, write_text
 from simbench.formats.container import CutOff, Entry, LogWriter, read_log
+from simbench.formats.picture_frames import PICTURE, AsPng, picture_frame, read_picture
+from simbench.formats.png import encode
 from simbench.formats.truth_frames import read_truth, truth_frames
 from simbench.isolate.frames import HEAD, Frame, FrameError, pack, pieces, sizes, unpack
 from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
@@ -52,7 +56,7 @@ class Source(Spec):
     seed: Annotated[int, Field(ge=0)]
     faults: tuple[Word, ...] = ()
     changes: tuple[Word, ...] = ()
-    images: Literal["none", "raycast"] = "none"
+    images: Literal["none", "raycast", "gl"] = "none"
 
 
 class Manifest(Spec):
@@ -78,7 +82,7 @@ class Stored:
         return "INCOMPLETE" if self.missing else "COMPLETE"
 
 
-def write_recording(recording: Recording, folder: Path, source: Source) -> Manifest:
+def write_recording(recording: Recording, folder: Path, source: Source, as_png: AsPng = encode) -> Manifest:
     """Write a recording into a folder that holds none. BadInput: it holds one, or cannot be written."""
     from importlib.metadata import version
 
@@ -88,7 +92,7 @@ def write_recording(recording: Recording, folder: Path, source: Source) -> Manif
     begun = Manifest(complete=False, simbench=version("simbench"), source=source)
     _write_manifest(begun, folder)
     try:
-        messages = _write(folder / MESSAGES, _messages(recording))
+        messages = _write(folder / MESSAGES, _messages(recording, as_png))
         truth = _write(folder / TRUTH, _truth(recording))
     except OSError as error:
         raise BadInput(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
@@ -111,7 +115,7 @@ def read_recording(folder: Path) -> Stored:
         raise BadInput(wrong, file=str(folder / MESSAGES))
     try:
         calibration, categories = read_reset(messages[0])
-        told = tuple(read_message(frame) for frame in messages[1:])
+        told = tuple(_message(frame) for frame in messages[1:])
     except FrameError as error:
         raise BadInput(f"is malformed: {error}", file=str(folder / MESSAGES)) from None
     try:
@@ -144,13 +148,20 @@ def _write_manifest(manifest: Manifest, folder: Path) -> None:
     write_text(folder / MANIFEST, json.dumps(content, indent=1) + "\n")
 
 
-def _messages(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:
+def _messages(recording: Recording, as_png: AsPng = encode) -> Iterator[tuple[str, int, int, Frame]]:
     """Topic, arrival, claimed stamp and frame."""
     first_ns = recording.messages[0].arrival_ns if recording.messages else 0
     yield "/calibration", first_ns, first_ns, reset_frame(recording.calibration, recording.categories)
     for message in recording.messages:
-        frame = message_frame(message)
+        if isinstance(message, CameraImage):
+            frame = picture_frame(message, as_png)
+        else:
+            frame = message_frame(message)
         yield f"/{message.sensor}/{frame.kind}", message.arrival_ns, message.stamp_ns, frame
+
+
+def _message(frame: Frame) -> Measurement:
+    return read_picture(frame) if frame.kind == PICTURE else read_message(frame)
 
 
 def _truth(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from simbench.campaign.job_key import job_key
 from simbench.case import Job
+from simbench.formats.png import Pictures
 from simbench.formats.store import Source, write_recording
 from simbench.run import mismatch, recording_of
 
@@ -45,13 +46,14 @@ def key_of(task: Task) -> str:
 def row_of(task: Task) -> str:
     """Make a recording and write it; its row as JSON text."""
     begun = time.perf_counter()
-    _, _, made = recording_of(task.job)
-    if why := mismatch(made.receipts):
-        return json.dumps(asdict(Row(name=task.name, status="receipt_mismatch", why=why)))
-    written = time.perf_counter()
-    place, beside = Path(task.out) / task.name, Path(task.out) / f".{task.name}"
-    shutil.rmtree(beside, ignore_errors=True)  # what a killed worker left
-    messages = write_recording(made.recording, beside, source_of(task.job)).messages
+    with Pictures() as pictures:
+        _, _, made = recording_of(task.job, pictures.beside)
+        if why := mismatch(made.receipts):
+            return json.dumps(asdict(Row(name=task.name, status="receipt_mismatch", why=why)))
+        written = time.perf_counter()
+        place, beside = Path(task.out) / task.name, Path(task.out) / f".{task.name}"
+        shutil.rmtree(beside, ignore_errors=True)  # what a killed worker left
+        messages = write_recording(made.recording, beside, source_of(task.job), pictures.png).messages
     assert messages is not None  # it is complete
     shutil.rmtree(place, ignore_errors=True)  # made by other code, or the ledger would hold it
     beside.rename(place)
@@ -67,7 +69,7 @@ def source_of(job: Job) -> Source:
     """A job in the words of a recording's manifest."""
     return Source(
         scenario=job.scenario, system=job.system, seed=job.seed, faults=job.faults, changes=job.changes,
-        images="none" if job.images == "none" else "raycast",
+        images=job.images,
     )  # fmt: skip
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import struct
+import subprocess
+import sys
+import time
 import zlib
 from pathlib import Path
 
@@ -17,6 +20,7 @@ from scenarios.errors import BadInput
 from simbench.formats.container import CutOff, Entry, LogWriter, read_log
 
 ENCODING = "test/1"
+ROOT = Path(__file__).parents[3]
 FILES = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -70,6 +74,32 @@ def test_a_writer_that_never_ended_leaves_its_whole_chunks(tmp_path: Path) -> No
     found, error = read(tmp_path / "a.mcap")
     assert isinstance(error, CutOff)
     assert found == entries()[: len(found)] and 45 < len(found) < 60
+
+
+WRITER = """
+import sys
+from pathlib import Path
+from simbench.formats.container import LogWriter
+with LogWriter(Path(sys.argv[1]), encoding="test/1", describe=lambda t: (t, "words"), chunk_bytes=1000) as log:
+    for i in range(10**9):
+        log.add(f"/t{i % 3}", [bytes([i % 256]) * 100], log_ns=i, publish_ns=i, seq=i // 3)
+"""
+
+
+def test_a_writer_that_is_killed_leaves_all_chunks_but_the_last(tmp_path: Path) -> None:
+    path = tmp_path / "killed.mcap"
+    process = subprocess.Popen([sys.executable, "-c", WRITER, str(path)], cwd=ROOT)
+    try:
+        deadline = time.monotonic() + 60
+        while (not path.exists() or path.stat().st_size < 200_000) and time.monotonic() < deadline:
+            time.sleep(0.01)
+    finally:
+        process.kill()
+        process.wait()
+    found, error = read(path)
+    assert isinstance(error, CutOff)
+    assert len(found) > 1000
+    assert all(e.data == bytes([e.log_ns % 256]) * 100 and e.log_ns == i for i, e in enumerate(found))
 
 
 @FILES

@@ -66,9 +66,9 @@ def test_two_workers_write_the_same_bytes_as_one(made: Path, tmp_path: Path) -> 
 def test_what_is_there_is_not_made_again_and_what_a_killed_worker_left_is_in_nobodys_way(made: Path) -> None:
     honest, seen = work.recording_of, list[int]()
 
-    def counted(job: Job) -> object:
+    def counted(job: Job, *more: object) -> object:
         seen.append(job.seed)
-        return honest(job)
+        return honest(job, *more)
 
     (made / ".overtake-approach-car-0002").mkdir()
     (made / ".overtake-approach-car-0002" / MANIFEST).write_text("{}", encoding="utf-8")
@@ -85,7 +85,7 @@ def test_a_recording_that_was_made_and_is_gone_is_told(made: Path) -> None:
 
 
 def test_an_error_that_did_not_take_effect_is_not_kept(tmp_path: Path) -> None:
-    def lying(job: Job) -> tuple[object, object, Made]:
+    def lying(job: Job, *_: object) -> tuple[object, object, Made]:
         scenario, faults, made = recording_of(job)
         return scenario, faults, replace(made, receipts=tuple(map(spoil, made.receipts)))
 
