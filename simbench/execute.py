@@ -22,7 +22,7 @@ def execute(planned: list[Job], out: Path, images: Images, workers: int | None, 
     from simbench.campaign.jobs import run_jobs
     from simbench.environment import environment
     from simbench.files import prepare_folder
-    from simbench.formats.kitti import is_recorded
+    from simbench.formats.targets import is_recorded
     from simbench.outcome import exit_code
     from simbench.report.page import write_report
     from simbench.result_file import print_result

@@ -17,10 +17,11 @@ import numpy as np
 from fusion.check import digest
 from scenarios.describe import describe
 from scenarios.scenario import Scenario
-from simbench.case import ORACLE, Case, Job, JobResult, boxes_of
+from simbench.case import ORACLE, Boxes, Case, Job, JobResult, boxes_of
 from simbench.drive import Driven
 from simbench.files import write_text
 from simbench.formats.scene import as_yaml
+from simbench.formats.targets import is_stored
 from simbench.isolate.limits import DEFAULT
 from simbench.result_file import write_result
 
@@ -52,7 +53,8 @@ def reproduce(job: Job, pipelines: Iterable[str]) -> str:
     words = ["simbench", "run", job.scenario, "--system", job.system]
     for name in pipelines:
         words += ["--pipeline", name]
-    words += ["--seeds", str(job.seed)]
+    if not is_stored(job.scenario):
+        words += ["--seeds", str(job.seed)]
     for text in job.faults:
         words += ["--faults", text]
     for text in job.changes:
@@ -128,9 +130,15 @@ def _case(result: JobResult, case: Case) -> dict[str, Any]:
         "off": list(result.job.off),
         "shake": result.shake,
         "receipts": [dataclasses.asdict(receipt) for receipt in result.receipts],
-        "boxes": boxes_of(result.job, not isinstance(result.scenario, Scenario)),
+        "boxes": _boxes(result),
         "command": reproduce(result.job, pipelines),
     }
+
+
+def _boxes(result: JobResult) -> Boxes:
+    """Where detections came from."""
+    played = result.scenario
+    return boxes_of(result.job, recorded=False) if isinstance(played, Scenario) else played.boxes
 
 
 def latency_ms(case: Case) -> dict[str, tuple[float, int]]:

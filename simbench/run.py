@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from scenarios.errors import BadInput
 from scenarios.fault_set import FaultSet
 from scenarios.scenario import Scenario
 from simbench.case import ORACLE, Case, Job, JobResult, failed, scored
@@ -19,9 +20,10 @@ from simbench.exhibit import PairView, pair_views
 from simbench.faults.draw import shake_words
 from simbench.faults.proof import receipts
 from simbench.faults.receipt import MISMATCH, Receipt
-from simbench.formats.jobs import play_job, player_of
-from simbench.formats.kitti import is_recorded
+from simbench.formats.jobs import play_job
+from simbench.formats.recorded import Recorded
 from simbench.formats.scene import RecordedScene
+from simbench.formats.targets import is_recorded
 from simbench.isolate.ask import runs_apart
 from simbench.isolate.drive import drive_isolated
 from simbench.isolate.limits import DEFAULT, Failed, Isolate, Limits, TimedOut
@@ -45,8 +47,7 @@ def run_job(job: Job) -> JobResult:
     if is_recorded(job.scenario):
         played = play_job(job)
         clock.lap("files")
-        made = Made(recording=played.recording, receipts=played.receipts, shake="")
-        result = _guarded(job, played.scene, played.faults, lambda: made, clock)
+        result = _guarded(job, played.scene, played.faults, lambda: _whole(played), clock)
         frames_and_pairs.cache_clear()  # a sequence may be large: none is kept beside the next
         return result
     staged = stage(job)
@@ -66,6 +67,13 @@ class Made:
     shake: str
 
 
+def _whole(played: Recorded) -> Made:
+    """BadInput: a part of the recording is missing. No number is ever made of the rest."""
+    if played.missing:
+        raise BadInput(f"INCOMPLETE: {'; '.join(played.missing)}")
+    return Made(recording=played.recording, receipts=played.receipts, shake=played.shake)
+
+
 def _record(job: Job, staged: Stage, picture: TakePicture | None, clock: Clock) -> Made:
     captured = record(job, staged, picture)
     clock.lap("sensors")
@@ -83,12 +91,8 @@ def recording_of(
     `images` is `none`. `beside` may do something with every picture that is taken. Raises BadInput, and as
     `stage.camera_of`."""
     if is_recorded(job.scenario):
-        played = player_of(job).play(images=job.images != "none")
-        return (
-            played.scene,
-            played.faults,
-            Made(recording=played.recording, receipts=played.receipts, shake=""),
-        )
+        played = play_job(job, images=job.images != "none")
+        return played.scene, played.faults, _whole(played)
     staged = stage(job)
     with camera_of(job, staged) as take:
         picture = None if take is None else beside(take)

@@ -12,7 +12,7 @@ from simbench.commands.options import DEFAULT, OF_THE_PAPER, common, isolation, 
 from simbench.execute import execute
 
 if TYPE_CHECKING:
-    from simbench.case import Boxes, Images, Job
+    from simbench.case import Boxes, Images
 
 
 def _span(_: click.Context, __: click.Parameter, text: str | None) -> tuple[int, int] | None:
@@ -106,7 +106,8 @@ def run(
 
     Of scenarios: where errors are injected, the same drives are also run with errors off. A target
     kitti:FOLDER is recorded data: every frame (object layout), sequence or drive is a run, called by its
-    number; --seeds picks some.
+    number; --seeds picks some. A FOLDER that 'simbench generate' wrote (or rec:FOLDER) is played as it was
+    made.
 
     Example: simbench run overtake-approach --system car --faults timing.trigger_offset_ms=50 --seeds 0-1
     """
@@ -116,10 +117,13 @@ def run(
     from scenarios.load import load_scenario
     from simbench.calibration.find import found_for
     from simbench.case import Job
-    from simbench.formats.kitti import is_recorded
+    from simbench.formats.jobs import plan_recorded
+    from simbench.formats.stored import stored_target
+    from simbench.formats.targets import is_recorded
     from simbench.isolate.ask import check_pipeline_name
     from simbench.stage import faults_of
 
+    targets = tuple(stored_target(target) or target for target in targets)
     if _is_suite(targets, suite):
         _run_suite(targets, pipelines, seeds, jobs, out, as_json, apart, suite)
     chosen = tuple(dict.fromkeys(pipelines)) or DEFAULT
@@ -139,7 +143,7 @@ def run(
             scenario="", system=system, seed=0, pipelines=chosen, faults=faults, images=images, size_px=size,
             boxes=boxes, frames=span, **apart,
         )  # fmt: skip
-        planned += _recorded_jobs(recorded, template, seeds if given else None, alone)
+        planned += plan_recorded(recorded, template, seeds if given else None, alone=alone)
     if len(recorded) < len(dict.fromkeys(targets)):
         parse_fault_arguments(faults)
         if span is not None:
@@ -162,7 +166,8 @@ def run(
                 if not alone and len(faults_of(job, family, family.resolve(seed))) > 0:
                     planned.append(replace(job, faults=("none",), images="none"))
                 planned.append(job)
-    execute(planned, out, images, jobs, as_json)
+    pictures = images if any(job.images != "none" for job in planned) else "none"
+    execute(planned, out, pictures, jobs, as_json)
 
 
 FOR_SCENARIOS = (
@@ -216,15 +221,3 @@ def _option(name: str) -> str:
     """How an option is written, by its parameter's name."""
     parameters = click.get_current_context().command.params
     return next(parameter.opts[0] for parameter in parameters if parameter.name == name)
-
-
-def _recorded_jobs(
-    targets: list[str], template: Job, numbers: tuple[int, ...] | None, alone: bool
-) -> list[Job]:
-    from dataclasses import replace
-
-    from simbench.formats.jobs import plan
-
-    if len(targets) > 1:  # they would share their names and numbers in every table
-        raise click.UsageError(f"one kitti: folder at a time, not {len(targets)}")
-    return plan(replace(template, scenario=targets[0]), numbers, alone=alone)

@@ -14,6 +14,8 @@ from simbench.formats.inject import check_faults
 from simbench.formats.kitti import WORDS, listed, open_kitti
 from simbench.formats.recorded import Player, Recorded, words
 from simbench.formats.scene import SYSTEM
+from simbench.formats.stored import plan_stored, play_stored
+from simbench.formats.targets import is_stored
 from simbench.isolate.ask import reads_images
 
 MOST_JOBS = 100_000
@@ -52,13 +54,33 @@ def plan(job: Job, numbers: Sequence[int] | None, *, alone: bool) -> list[Job]:
     return planned
 
 
+def plan_recorded(
+    targets: Sequence[str], template: Job, numbers: Sequence[int] | None, *, alone: bool
+) -> list[Job]:
+    """The jobs of all recorded targets: see `plan` and `plan_stored`. BadInput, and for more than one folder
+    of KITTI, whose recordings would share their names and numbers in every table."""
+    kitti = [target for target in targets if not is_stored(target)]
+    if len(kitti) > 1:
+        raise BadInput(f"one kitti: folder at a time, not {len(kitti)}")
+    planned = [
+        plan_stored(replace(template, scenario=target), numbers) for target in targets if is_stored(target)
+    ]
+    for target in kitti:
+        planned += plan(replace(template, scenario=target), numbers, alone=alone)
+    return planned
+
+
 def player_of(job: Job) -> Player:
     """The recording of a job, opened. BadInput: it cannot be, or a fault cannot act on it."""
     drive = open_kitti(job.scenario).drive(job.seed, job.frames)
     return Player(drive, parse_recorded_faults(job.faults), boxes=boxes_of(job, recorded=True))
 
 
-def play_job(job: Job) -> Recorded:
-    """The recording of a job, read; its images too where a pipeline wants them. BadInput as above."""
-    wanted = job.images != "none" and any(reads_images(name) for name in job.pipelines)
-    return player_of(job).play(images=wanted)
+def play_job(job: Job, *, images: bool | None = None) -> Recorded:
+    """The recording of a job, read. images: its images too; None: where a pipeline wants them. BadInput as
+    above, and as `play_stored`."""
+    if images is None:
+        images = job.images != "none" and any(reads_images(name) for name in job.pipelines)
+    if is_stored(job.scenario):
+        return play_stored(job, images=images)
+    return player_of(job).play(images=images)

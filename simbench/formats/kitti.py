@@ -25,8 +25,8 @@ from scenarios.errors import BadInput
 from simbench.formats.calibration import KittiCalibration, parse_calibration
 from simbench.formats.folder import Folder, Line
 from simbench.formats.labels import Label, object_labels, tracking_labels
+from simbench.formats.targets import KITTI
 
-PREFIX = "kitti:"
 Layout = Literal["object", "tracking", "raw"]
 Span = tuple[int, int]  # first and last frame
 PERIOD_NS = 100_000_000  # the LiDAR turns ten times a second; only the raw layout says exactly when
@@ -111,14 +111,9 @@ class KittiFolder:
         return drive
 
 
-def is_recorded(target: str) -> bool:
-    """Whether a target names recorded data rather than a scenario."""
-    return target.startswith(PREFIX)
-
-
 def open_kitti(target: str) -> KittiFolder:
     """The folder of `kitti:PATH`. BadInput: it is not there, or has none of the layouts."""
-    folder = Folder.open(target.removeprefix(PREFIX))
+    folder = Folder.open(target.removeprefix(KITTI))
     if folder.has("calib_cam_to_cam.txt"):
         return _folder(folder, "raw", "", re.compile(r"\d{4}_\d\d_\d\d_drive_(\d{4})_(?:sync|extract)"))
     if folder.has("label_02") or folder.has("image_02"):
@@ -130,7 +125,7 @@ def open_kitti(target: str) -> KittiFolder:
         "no KITTI layout is here",
         file=folder.shown,
         allowed="a folder with image_2 (object), image_02 (tracking) or calib_cam_to_cam.txt (raw, one day)",
-        hint=None if inner is None else PREFIX + folder.name_of(inner),
+        hint=None if inner is None else KITTI + folder.name_of(inner),
     )
 
 

@@ -48,12 +48,15 @@ DETECTOR = DetectorSpec().model_copy(update={"categories": tuple(SIZES)})  # a m
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Recorded:
-    """A recording with what its report needs. `recording.truth` is by labels."""
+    """A recording with what its report needs. `shake`: how the body shook, in words, where that is known.
+    missing: what of it is not there, in sentences."""
 
     scene: RecordedScene
     faults: FaultSet
     recording: Recording
     receipts: tuple[Receipt, ...]
+    shake: str = ""
+    missing: tuple[str, ...] = ()
 
 
 class Player:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from scenarios.scenario import Finite, Name, NonNegative, Positive, Spec
 
-SYSTEM = "car"  # the data were recorded from a car; there is no second rig
+SYSTEM = "car"  # data of KITTI were recorded from a car; there is no second rig
 
 
 class RecordedObject(Spec):
@@ -27,11 +27,13 @@ class RecordedSystem(Spec):
 class RecordedScene(Spec):
     """One recording. `number`: of the object layout's frame, the sequence or the drive; it is the run's seed.
 
-    `sha256`: of everything that was read. `boxes`: where detections come from.
+    `sha256`: of everything that was read. `boxes`: where detections come from. `rig`: what
+    the system is called.
     """
 
     name: Name
     description: str
+    rig: str = SYSTEM
     number: NonNegative
     frames: tuple[int, int]
     sweeps: int
@@ -42,7 +44,7 @@ class RecordedScene(Spec):
 
     def system(self, name: str) -> RecordedSystem:
         """The one system. KeyError: another one is asked for."""
-        if name != SYSTEM:
+        if name != self.rig:
             raise KeyError(name)
         return RecordedSystem(target=self.objects[0].name if self.objects else None)
 

@@ -16,14 +16,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field, TypeAdapter
 
 from fusion.messages import CameraImage, Measurement
 from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
+from simbench.faults.receipt import Receipt
 from simbench.files import prepare_folder, write_text
 from simbench.formats.container import CutOff, Entry, LogWriter, read_log
 from simbench.formats.picture_frames import PICTURE, AsPng, picture_frame, read_picture
@@ -38,6 +39,11 @@ ENCODING = "simbench-frame/1"
 MANIFEST, MESSAGES, TRUTH = "recording.json", "messages.mcap", "truth.mcap"
 LONGEST_MANIFEST = 1_000_000
 Word = Annotated[str, Field(max_length=4000)]
+
+
+def _receipt(value: object) -> object:
+    """A receipt of what a file holds of it; strict models take instances only."""
+    return TypeAdapter(Receipt).validate_python(value) if isinstance(value, dict) else value
 
 
 class Part(Spec):
@@ -59,12 +65,26 @@ class Source(Spec):
     images: Literal["none", "raycast", "gl"] = "none"
 
 
+class Injected(Spec):
+    """Which errors act: the set's label, all fields by fault, how the body shook in words, and what proves
+    them."""
+
+    label: Word = "none"
+    specs: Mapping[Word, Mapping[str, Any]] = {}
+    shake: Word = ""
+    receipts: tuple[Annotated[Receipt, BeforeValidator(_receipt)], ...] = ()
+
+
+NOTHING = Injected()
+
+
 class Manifest(Spec):
     """What a recording says of itself. simbench: the version that wrote it."""
 
     complete: bool
     simbench: Word
     source: Source
+    injected: Injected = NOTHING
     messages: Part | None = None
     truth: Part | None = None
 
@@ -82,14 +102,20 @@ class Stored:
         return "INCOMPLETE" if self.missing else "COMPLETE"
 
 
-def write_recording(recording: Recording, folder: Path, source: Source, as_png: AsPng = encode) -> Manifest:
+def write_recording(
+    recording: Recording,
+    folder: Path,
+    source: Source,
+    injected: Injected = NOTHING,
+    as_png: AsPng = encode,
+) -> Manifest:
     """Write a recording into a folder that holds none. BadInput: it holds one, or cannot be written."""
     from importlib.metadata import version
 
     prepare_folder(folder)
     if (folder / MANIFEST).exists():
         raise BadInput("holds a recording already", file=str(folder))
-    begun = Manifest(complete=False, simbench=version("simbench"), source=source)
+    begun = Manifest(complete=False, simbench=version("simbench"), source=source, injected=injected)
     _write_manifest(begun, folder)
     try:
         messages = _write(folder / MESSAGES, _messages(recording, as_png))

@@ -11,7 +11,7 @@ from pathlib import Path
 from simbench.campaign.job_key import job_key
 from simbench.case import Job
 from simbench.formats.png import Pictures
-from simbench.formats.store import Source, write_recording
+from simbench.formats.store import Injected, Source, write_recording
 from simbench.run import mismatch, recording_of
 
 
@@ -47,13 +47,17 @@ def row_of(task: Task) -> str:
     """Make a recording and write it; its row as JSON text."""
     begun = time.perf_counter()
     with Pictures() as pictures:
-        _, _, made = recording_of(task.job, pictures.beside)
+        _, faults, made = recording_of(task.job, pictures.beside)
         if why := mismatch(made.receipts):
             return json.dumps(asdict(Row(name=task.name, status="receipt_mismatch", why=why)))
         written = time.perf_counter()
         place, beside = Path(task.out) / task.name, Path(task.out) / f".{task.name}"
         shutil.rmtree(beside, ignore_errors=True)  # what a killed worker left
-        messages = write_recording(made.recording, beside, source_of(task.job), pictures.png).messages
+        injected = Injected(
+            label=faults.label, specs=faults.as_data(), shake=made.shake, receipts=made.receipts
+        )
+        source = source_of(task.job)
+        messages = write_recording(made.recording, beside, source, injected, pictures.png).messages
     assert messages is not None  # it is complete
     shutil.rmtree(place, ignore_errors=True)  # made by other code, or the ledger would hold it
     beside.rename(place)

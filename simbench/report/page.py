@@ -15,8 +15,8 @@ from scenarios.errors import BadInput
 from simbench.case import Images, Job, JobResult
 from simbench.exhibit import PairView
 from simbench.files import write_text
-from simbench.formats.kitti import is_recorded
 from simbench.formats.scene import RecordedScene
+from simbench.formats.targets import is_recorded, is_stored
 from simbench.report import figures, palette, tables
 from simbench.report.agreement import (
     AgreementLine,
@@ -172,6 +172,7 @@ def write_report(
         raise ValueError("a report needs at least one result")
     groups = groups_of(results)
     recorded = all(is_recorded(r.job.scenario) for r in results)
+    labelled = recorded and not any(is_stored(r.job.scenario) for r in results)
     sections = tuple(
         _section(group, number, images=images, out=out) for number, group in enumerate(groups, start=1)
     )
@@ -187,7 +188,7 @@ def write_report(
         names=tables.name_lines(groups),
         receipts=tables.receipt_lines(results),
         failed=[(r, c) for r in results for c in r.cases if c.status != "ok"],
-        not_shown=_not_shown(groups, images, recorded),
+        not_shown=_not_shown(groups, images, labelled),
         objects=object_tables(results),
         most_lines=MOST_LINES,
         environment=_flat(environment),
@@ -223,17 +224,17 @@ def _template() -> Any:
     return made.get_template("page.html.j2")
 
 
-def _not_shown(groups: Sequence[Group], images: Images, recorded: bool) -> tuple[str, ...]:
+def _not_shown(groups: Sequence[Group], images: Images, labelled: bool) -> tuple[str, ...]:
     few = min(len(group.runs) for group in groups) < MIN_RUNS
     first = (
         (f"{runs_words(groups)}. No intervals, no p-values: other seeds may look different.",) if few else ()
     )
     scenarios = counted(len({g.scenario for g in groups}), "scenario")
     last = (f"{scenarios} of the catalogue: the numbers are about these, not about traffic.",)
-    if recorded:
+    if labelled:
         last = ("The numbers are about these recordings, not about traffic.",)
     plain = ("No pictures were rendered: points stand on a plain ground.",) if images == "none" else ()
-    return (*first, *(RECORDED_NOT_SHOWN if recorded else NOT_SHOWN), *last, *plain)
+    return (*first, *(RECORDED_NOT_SHOWN if labelled else NOT_SHOWN), *last, *plain)
 
 
 def _flat(environment: Mapping[str, object], above: str = "") -> list[tuple[str, str]]:

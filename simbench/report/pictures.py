@@ -24,11 +24,12 @@ from simbench.capture import set_in_motion
 from simbench.case import Images, Job
 from simbench.exhibit import PairView
 from simbench.faults.draw import Drawn, draw
-from simbench.formats.kitti import is_recorded
+from simbench.formats.targets import is_recorded, is_stored
 from simbench.isolate.reference import is_ours
 from simbench.motion import Motion, at
 from simbench.plugins import load_pipeline
 from simbench.report.recorded import RecordedReplay
+from simbench.report.stored import StoredReplay
 from simbench.report.words import stamp_words
 from simbench.sensors import lidar
 from simbench.sensors.camera import take
@@ -78,6 +79,8 @@ class Replayed(Protocol):
 
 def replay_of(job: Job) -> Replayed:
     """The job again. Raises BadInput where its scenario or its files are not there any more."""
+    if is_stored(job.scenario):
+        return StoredReplay(job)
     return RecordedReplay(job) if is_recorded(job.scenario) else Replay(job)
 
 

@@ -18,7 +18,7 @@ from fusion.camera import PinholeCamera
 from fusion.messages import BoxPx
 from simbench.case import Images, JobResult
 from simbench.exhibit import PairView
-from simbench.formats.kitti import is_recorded
+from simbench.formats.targets import is_recorded
 from simbench.report import palette
 from simbench.report.choose import Group, groups_of, pairs_of, shift_px
 from simbench.report.overlay import (

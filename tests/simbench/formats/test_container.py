@@ -80,7 +80,8 @@ WRITER = """
 import sys
 from pathlib import Path
 from simbench.formats.container import LogWriter
-with LogWriter(Path(sys.argv[1]), encoding="test/1", describe=lambda t: (t, "words"), chunk_bytes=1000) as log:
+path, words = Path(sys.argv[1]), lambda topic: (topic, "words")
+with LogWriter(path, encoding="test/1", describe=words, chunk_bytes=1000) as log:
     for i in range(10**9):
         log.add(f"/t{i % 3}", [bytes([i % 256]) * 100], log_ns=i, publish_ns=i, seq=i // 3)
 """

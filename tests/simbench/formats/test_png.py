@@ -90,7 +90,7 @@ def test_a_recording_with_pictures_comes_back_bit_by_bit(tmp_path: Path) -> None
     source = Source(scenario="overtake-approach", system="car", seed=0, images="raycast")
     with Pictures() as pictures:
         made = recording_of(job, pictures.beside)[2].recording
-        one = write_recording(made, tmp_path / "a", source, pictures.png)
+        one = write_recording(made, tmp_path / "a", source, as_png=pictures.png)
     assert one == write_recording(made, tmp_path / "b", source)
     found = read_recording(tmp_path / "a").recording.messages
     was = [m for m in made.messages if isinstance(m, CameraImage)]
