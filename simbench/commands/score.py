@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @click.argument("target", metavar="TARGET")
 @click.option(
     "--results", type=click.Path(path_type=Path), default=None, metavar="FILE",
-    help="JSON lines (simbench-outputs/1). Without it the messages are written.",
+    help="JSON lines (simbench-outputs/1), or positions: .csv. Without it the messages are written.",
 )  # fmt: skip
 @click.option("--system", type=click.Choice(["car", "wearable"]), default="car", show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True)
@@ -36,22 +36,28 @@ def score(
 ) -> None:  # fmt: skip
     """Score what was computed elsewhere; first, without --results, write the messages to compute on.
 
-    TARGET (a scenario, a .yaml file or kitti:FOLDER) with the same options and seed is the same recording
-    each time. Writes OUT/messages.sbf (frames, see docs/pipeline.md) or OUT/result.json.
+    TARGET (a scenario, a .yaml file, kitti:FOLDER or a recording's folder) with the same options and seed is
+    the same recording each time. Writes OUT/messages.sbf (frames, see docs/pipeline.md) or OUT/result.json.
 
     Example: simbench score overtake-approach --system car --seed 0
     """
     import shlex
     import sys
+    from dataclasses import replace
 
     from simbench.case import Job
     from simbench.elsewhere.command import print_rows, score_results, write_messages
+    from simbench.formats.stored import plan_stored, stored_target
+    from simbench.formats.targets import is_stored
     from simbench.result_file import print_result
 
+    target = stored_target(target) or target
     job = Job(
         scenario=target, system=system, seed=seed, pipelines=(), faults=faults, changes=changes, boxes=boxes,
         images=images,
     )  # fmt: skip
+    if is_stored(target):
+        job = plan_stored(replace(job, system="both"), None)
     if results is None:
         click.echo(f"messages: {write_messages(job, out)}")
         return

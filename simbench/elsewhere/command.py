@@ -10,6 +10,8 @@ from simbench.case import Case, Job, JobResult, scored
 from simbench.drive import Driven
 from simbench.elsewhere.messages import messages_as_bytes
 from simbench.elsewhere.outputs import read_outputs
+from simbench.elsewhere.positions import score_positions
+from simbench.elsewhere.table import read_table
 from simbench.environment import environment
 from simbench.files import prepare_folder, write_bytes
 from simbench.outcome import exit_code
@@ -47,9 +49,13 @@ def score_results(job: Job, results: Path, out: Path, command: str) -> tuple[Rec
 
 
 def _case(results: Path, made: Made) -> Case:
-    outputs, trajectories = read_outputs(results, made.recording)
-    driven = Driven(outputs=outputs, trajectories=trajectories, scan_ms=(), step_ns={})
-    case = scored(results.name, score_objects(made.recording, outputs, trajectories), driven)
+    if results.suffix.lower() == ".csv":
+        scores = score_positions(made.recording, read_table(results), str(results))
+        case = scored(results.name, scores, None)
+    else:
+        outputs, trajectories = read_outputs(results, made.recording)
+        driven = Driven(outputs=outputs, trajectories=trajectories, scan_ms=(), step_ns={})
+        case = scored(results.name, score_objects(made.recording, outputs, trajectories), driven)
     why = mismatch(made.receipts)
     return spoiled(case, why) if why else case
 

@@ -4,7 +4,8 @@ An output object is the true object behind the box of its (camera, track id) in 
 scan; a false box, an unknown id or an image that is not paired makes it a false object. A trajectory belongs
 to the object of most of its track's boxes (ties: the object that was seen first).
 
-`known_tracks` names objects by track id without any box. Only the oracle uses it, for what no detector found.
+`known_tracks` names objects by track id without any box. The oracle uses it, for what no detector found,
+and results that are positions only.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ these is null, with the reason.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from fusion.messages import FusionOutput, Trajectory
 from simbench.recording import Recording
 from simbench.score.budget import budget_estimates
 from simbench.score.frames import Frame
+from simbench.score.identity import NO_TRACKS
 from simbench.score.localization import frame_estimates
 from simbench.score.mapping import mapping_estimates
 from simbench.score.metrics import Estimate, mean_of, null, rows_of
@@ -29,12 +30,17 @@ ONE_FRAME = "one frame: there is no trajectory"
 
 
 def score_objects(
-    recording: Recording, outputs: Sequence[FusionOutput], trajectories: Sequence[Trajectory]
+    recording: Recording,
+    outputs: Sequence[FusionOutput],
+    trajectories: Sequence[Trajectory],
+    *,
+    known_tracks: Mapping[int, int] = NO_TRACKS,
 ) -> Scores:
     """`score` for a recording with any number of targets. Raises what `score` raises."""
     if not recording.truth.targets:
-        return score(recording, outputs, trajectories)
-    return together(recording, [score(part, outputs, trajectories) for part in recording.by_target])
+        return score(recording, outputs, trajectories, known_tracks=known_tracks)
+    each = [score(part, outputs, trajectories, known_tracks=known_tracks) for part in recording.by_target]
+    return together(recording, each)
 
 
 def score_oracles(recording: Recording) -> Scores:

@@ -69,7 +69,8 @@ def score(
 ) -> Scores:
     """Score a pipeline's outputs (any order, at most one per delivered scan) and its trajectories.
 
-    `known_tracks` (track id -> object id) is for the oracle only, see `oracle.py`. Raises `ContractError` for
+    `known_tracks` (track id -> object id) is for the oracle (`oracle.py`), and for results without 2-D boxes
+    (`elsewhere/positions.py`). Raises `ContractError` for
     an output that breaks the contract, ValueError for a recording whose truth does not fit its messages.
     """
     truth = recording.truth
