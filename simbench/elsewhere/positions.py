@@ -2,7 +2,7 @@
 
 Nothing says which object such a position means, so the truth says it: a track is the object that most of its
 positions are nearest to, not farther than `GATE_M`; a track of which most are near nothing is false. Errors
-beyond the gate and swapped names therefore show as false objects and missing coverage, not as metres. Where no
+beyond the gate and swapped names thus show as false objects and missing coverage, not as metres. Where no
 points are told there is no mapping to score.
 """
 
