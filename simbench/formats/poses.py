@@ -38,6 +38,10 @@ class RecordedPoses:
     ) -> None:
         self._calibration, self._T_ego_rect, self._tracks = calibration, T_ego_rect, dict(tracks)
 
+    def labelled_ns(self, object_id: int) -> Int64[np.ndarray, " k"]:
+        """When an object was labelled. KeyError: no such object."""
+        return self._tracks[object_id].t_ns
+
     def ego(
         self, t_ns: Int64[np.ndarray, " n"]
     ) -> tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]:
