@@ -22,6 +22,13 @@ def prepare_folder(folder: Path) -> None:
         raise BadInput(f"cannot write to {folder}: {error.strerror or error}") from error
 
 
+def prepare_empty_folder(folder: Path) -> None:
+    """`prepare_folder`, and BadInput where there is something in it already."""
+    prepare_folder(folder)
+    if next(folder.iterdir(), None) is not None:
+        raise BadInput("there is something in it already", file=str(folder), allowed="an empty folder")
+
+
 def write_text(path: Path, text: str) -> None:
     """Write UTF-8 under a temporary name, then rename."""
     write_bytes(path, text.encode("utf-8"))

@@ -15,9 +15,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
+from simbench.files import prepare_empty_folder
 from simbench.formats.kitti_write.drive import WrittenDrive, written_drive
-from simbench.formats.kitti_write.files import empty_folder
-from simbench.formats.kitti_write.labelled import write_object_layout, write_tracking_layout
+from simbench.formats.kitti_write.lines import write_object_layout, write_tracking_layout
 from simbench.formats.kitti_write.raw import day_of, write_raw_layout
 from simbench.recording import Recording
 
@@ -36,9 +36,8 @@ def write_kitti(
     LiDAR's x points. number: of the drive, the sequence or the first frame; our reader takes it for the seed.
     """
     drive = written_drive(recording, camera)
-    empty_folder(folder)
+    prepare_empty_folder(folder)
     name, write = LAYOUTS[layout]
-    (folder / name).mkdir()
     write(drive, folder / name, number)
     return len(drive.frames)
 

@@ -14,49 +14,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64, Int64
+from jaxtyping import Int64
 
 from fusion.camera import PinholeCamera
 from fusion.geometry import Transform
-from fusion.messages import BoxPx, CameraImage, Detections, EgoMotion, LidarScan
+from fusion.messages import CameraImage, Detections, EgoMotion, LidarScan
 from scenarios.errors import BadInput, nearest, show
-from simbench.formats.kitti_write.kinds import kind_of
-from simbench.formats.kitti_write.outline import outside_share
-from simbench.formats.kitti_write.rectify import STRAIGHT, straight_box
-from simbench.formats.poses import RecordedPoses
+from simbench.formats.kitti_write.objects import Labelled, labelled_objects, labels_of
+from simbench.formats.kitti_write.rectify import straight
 from simbench.recording import Recording
 from simbench.score.frames import nearest as nearest_stamp
-from simbench.truth import ImageTruth, ObjectInfo, ScanTruth, Truth
+from simbench.truth import ObjectInfo, ScanTruth
 
 AXIS_RAD = np.deg2rad(10.0)  # points so near to the camera's axis say when the LiDAR looked along it
-FARTHEST_M = 1000.0  # what is farther away has no label
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Labelled:
-    """One object in one frame. centre_m, yaw_rad: of its 3-D box in the rectified camera (rotation_y).
-
-    box_px: the whole outline in the image, in the bench's pixels, cut at the border; None where it is not in
-    the image, which may be because it is `behind` the camera. visible_fraction: as the truth says; 0 where
-    nothing is seen. outside: share of the projected 3-D box beyond the image's border. known: whether a
-    sensor saw it in this frame.
-    """
-
-    object_id: int
-    category: str
-    size_m: tuple[float, float, float]
-    centre_m: Float64[np.ndarray, "3"]
-    yaw_rad: float
-    box_px: BoxPx | None
-    visible_fraction: float
-    outside: float
-    behind: bool
-    known: bool
-
-    @property
-    def bottom_m(self) -> Float64[np.ndarray, "3"]:
-        """Centre of the box's bottom, as KITTI has it: half a height along the camera's y."""
-        return self.centre_m + np.array([0.0, 0.5 * self.size_m[2], 0.0])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,10 +70,10 @@ def written_drive(recording: Recording, camera: str | None = None) -> WrittenDri
     T_camera_lidar = told.T_camera_lidar(name, scans[0].sensor)
     drive = WrittenDrive(
         lens=lens,
-        camera=replace(lens, distortion=STRAIGHT),
+        camera=straight(lens),
         T_camera_lidar=T_camera_lidar,
         T_lidar_ego=told.T_ego_sensor[scans[0].sensor].inverse(),
-        objects=tuple(info for info in recording.truth.objects if kind_of(info.category) is not None),
+        objects=labelled_objects(recording.truth.objects),
         frames=(),
     )
     frames = tuple(_frames(recording, drive, name, scans))
@@ -157,8 +127,8 @@ def _frames(
     seqs, claimed = list(stamps), np.array(list(stamps.values()), dtype=np.int64)
     felt = np.array([m.stamp_ns for m in measured], dtype=np.int64)
     for scan in scans:
-        truly = known[scan.sensor, scan.seq]
-        stamp_ns, instant_ns = _passing(scan, truly, drive.T_camera_lidar)
+        hits = known[scan.sensor, scan.seq]
+        stamp_ns, instant_ns = _passing(scan, hits, drive.T_camera_lidar)
         at = nearest_stamp(claimed, stamp_ns, truth.period_ns / 2)
         if at is None:
             continue
@@ -171,7 +141,7 @@ def _frames(
             stamp_ns=stamp_ns,
             instant_ns=instant_ns,
             image_ns=int(claimed[at]),
-            labels=tuple(_labels(truth, drive, scan, truly, view, instant_ns)),
+            labels=tuple(labels_of(truth, scan, hits, view, instant_ns, drive.T_camera_lidar, drive.lens)),
             T_world_ego=Transform(rotation=rotation, translation_m=translation_m),
             ego=None if ego is None else measured[ego],
         )
@@ -194,58 +164,3 @@ def _passing(scan: LidarScan, truth: ScanTruth, T_camera_lidar: Transform) -> tu
 def _middle(t_ns: Int64[np.ndarray, " n"]) -> int:
     """The median, of two middle ones the earlier: a time that there was."""
     return int(np.sort(t_ns)[(len(t_ns) - 1) // 2])
-
-
-# -- labels -----------------------------------------------------------------------------------------------
-
-
-def _labels(
-    truth: Truth,
-    drive: WrittenDrive,
-    scan: LidarScan,
-    truly: ScanTruth,
-    view: ImageTruth,
-    instant_ns: int,
-) -> Iterator[Labelled]:
-    """Every object of KITTI's kinds, but for what carries the LiDAR. Known is what returned a point of the
-    sweep or is in the image; where the truth itself is labels, what was labelled then."""
-    at = np.array([instant_ns], dtype=np.int64)
-    (R_world_lidar,), (lidar_m,) = truth.poses.sensor(scan.sensor, at)
-    boxes = {box.object_id: box for box in view.boxes}
-    hit = set(np.unique(truly.object_id).tolist())
-    for info in drive.objects:
-        number = info.object_id
-        known = number in hit or number in boxes
-        if isinstance(truth.poses, RecordedPoses):
-            known = scan.stamp_ns in truth.poses.labelled_ns(number)
-        (R_world_box,), (box_m,) = truth.poses.object_centre(number, at)
-        R_lidar_box, centre_lidar_m = R_world_lidar.T @ R_world_box, R_world_lidar.T @ (box_m - lidar_m)
-        if _carries(R_lidar_box, centre_lidar_m, info.size_m):
-            continue
-        centre_m = drive.T_camera_lidar.apply(centre_lidar_m)
-        ahead = drive.T_camera_lidar.rotation @ R_lidar_box[:, 0]
-        yaw_rad = float(np.arctan2(-ahead[2], ahead[0]))
-        box = boxes.get(number)
-        seen = box is not None and box.visible_px is not None
-        yield Labelled(
-            object_id=number,
-            category=info.category,
-            size_m=info.size_m,
-            centre_m=centre_m,
-            yaw_rad=yaw_rad,
-            box_px=None if box is None else straight_box(box.amodal_px, drive.lens),
-            visible_fraction=box.visible_fraction if box is not None and seen else 0.0,
-            outside=outside_share(centre_m, yaw_rad, info.size_m, drive.camera),
-            behind=bool(centre_m[2] < 0.0),
-            known=known and bool(np.abs(centre_m).max() + info.size_m[2] < FARTHEST_M),
-        )
-
-
-def _carries(
-    R_lidar_box: Float64[np.ndarray, "3 3"],
-    centre_m: Float64[np.ndarray, "3"],
-    size_m: tuple[float, float, float],
-) -> bool:
-    """Whether the LiDAR stands over, in or under a box."""
-    lidar_in_box = -R_lidar_box.T @ centre_m
-    return bool((np.abs(lidar_in_box[:2]) <= 0.5 * np.array(size_m[:2])).all())

@@ -1,4 +1,4 @@
-"""Sweeps, pictures and folders, the same in all layouts."""
+"""Sweeps and pictures, the same in all layouts."""
 
 from __future__ import annotations
 
@@ -9,19 +9,9 @@ from jaxtyping import Int64
 
 from fusion.camera import PinholeCamera
 from fusion.messages import LidarScan
-from scenarios.errors import BadInput
-from simbench.files import prepare_folder, write_bytes
+from simbench.files import write_bytes
 from simbench.formats.kitti_write.drive import WrittenFrame
 from simbench.formats.kitti_write.rectify import straight_image
-
-
-def empty_folder(folder: Path) -> None:
-    """Make a folder to write into. BadInput: it cannot be, or there is something in it."""
-    prepare_folder(folder)
-    if next(folder.iterdir(), None) is not None:
-        raise BadInput(
-            "there is something in the folder already", file=str(folder), allowed="an empty folder"
-        )
 
 
 def write_sweep(scan: LidarScan, path: Path) -> None:

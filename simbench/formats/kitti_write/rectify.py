@@ -7,6 +7,8 @@ box is the rectangle around the straightened border of the old one: never smalle
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import UInt8
 
@@ -15,6 +17,11 @@ from fusion.messages import BoxPx
 
 STRAIGHT = (0.0, 0.0, 0.0, 0.0, 0.0)
 SAMPLES = 32  # along an edge of a box
+
+
+def straight(lens: PinholeCamera) -> PinholeCamera:
+    """The same camera without distortion."""
+    return replace(lens, distortion=STRAIGHT)
 
 
 def straight_image(rgb: UInt8[np.ndarray, "h w 3"], lens: PinholeCamera) -> UInt8[np.ndarray, "h w 3"]:

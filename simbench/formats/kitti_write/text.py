@@ -13,7 +13,7 @@ import numpy as np
 
 from fusion.camera import PinholeCamera
 from fusion.geometry import Transform
-from simbench.formats.kitti_write.drive import Labelled
+from simbench.formats.kitti_write.objects import Labelled
 
 EPOCH = datetime(2000, 1, 1, 12)
 """What 0 on the bench's clock is called: a simulated drive has no date."""

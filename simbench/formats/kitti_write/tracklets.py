@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Float64
 
 from simbench.formats.kitti_raw import OCCLUDED, TRUNCATED
-from simbench.formats.kitti_write.drive import Labelled, WrittenDrive
+from simbench.formats.kitti_write.drive import WrittenDrive
 from simbench.formats.kitti_write.kinds import kind_of, occlusion
+from simbench.formats.kitti_write.objects import Labelled
 
 SHARES = {level: share for level, share in OCCLUDED.items() if level >= 0}
 NOT_SAID, FULLY, IN_IMAGE, PARTLY, OUTSIDE, BEHIND = -1, 2, 0, 1, 2, 99

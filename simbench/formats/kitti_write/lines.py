@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 from simbench.files import write_text
-from simbench.formats.kitti_write.drive import Labelled, WrittenDrive
+from simbench.formats.kitti_write.drive import WrittenDrive
 from simbench.formats.kitti_write.files import write_picture, write_sweep
 from simbench.formats.kitti_write.kinds import kind_of, occlusion
+from simbench.formats.kitti_write.objects import Labelled
 from simbench.formats.kitti_write.oxts import oxts_text
 from simbench.formats.kitti_write.text import calibration_text, label_words, region_words
 from simbench.formats.labels import OUTSIDE_SHARE, UNKNOWN, VISIBLE_SHARE
