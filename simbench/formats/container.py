@@ -4,32 +4,25 @@ MCAP (mcap.dev) because its files are written as a stream, checked chunk by chun
 others wrote. What a message holds is its encoding's business; here it is bytes. A message carries the SHA-256
 of its content before the content.
 
-Files may come from anywhere: nothing larger than the file is read, no chunk is unpacked beyond what it says
-and what is allowed, and every checksum is checked.
+Files may come from anywhere (`mcap_records.py` reads them), and every checksum is checked.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
-import struct
-import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
 
 from scenarios.errors import BadInput
+from simbench.formats.mcap_records import CutOff, Found, read_records
+
+__all__ = ["CutOff", "Entry", "LogWriter", "read_log"]
 
 CHUNK_BYTES = 2**20
-MOST_CHUNK_BYTES = 512 * 2**20  # one message may be a picture or a long sweep
 DIGEST_BYTES = 32
-MAGIC = b"\x89MCAP0\r\n"  # what every MCAP file begins with
 LIBRARY = "simbench"
-
-
-class CutOff(BadInput):
-    """The file ends before its end; all whole chunks before were read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,133 +103,31 @@ class LogWriter:
 def read_log(path: Path, *, encoding: str) -> Iterator[Entry]:
     """All messages, chunk by chunk. BadInput: this is no such file, or it is damaged. CutOff: it ends too
     early; what came before is whole."""
-    from mcap.exceptions import McapError
-    from mcap.records import Channel, Chunk, Footer, Message
-    from mcap.stream_reader import StreamReader, breakup_chunk
-
     name = str(path)
-    channels: dict[int, Any] = {}
     counts: dict[str, int] = {}
-    ended = False
-    try:
-        with path.open("rb") as file:
-            size = os.fstat(file.fileno()).st_size
-            begin = file.read(len(MAGIC))
-            if not MAGIC.startswith(begin):
-                raise BadInput("is no MCAP file", file=name)
-            file.seek(0)
-            bounded = _Bounded(file, size)
-            reader = StreamReader(bounded, emit_chunks=True, validate_crcs=True, record_size_limit=size)  # type: ignore[arg-type]
-            for record in reader.records:
-                ended = ended or isinstance(record, Footer)
-                if isinstance(record, Message):
-                    raise BadInput("has a message outside of a chunk, which no checksum covers", file=name)
-                if isinstance(record, Channel):
-                    channels[record.id] = record
-                    continue
-                if not isinstance(record, Chunk):
-                    continue
-                for inner in breakup_chunk(_unpacked(record, name)):
-                    if isinstance(inner, Channel):
-                        channels[inner.id] = inner
-                    elif isinstance(inner, Message):
-                        entry = _entry(inner, channels, encoding, name)
-                        if entry.seq != counts.setdefault(entry.topic, 0):
-                            raise BadInput(
-                                f"is damaged: message {counts[entry.topic]} of {entry.topic} is missing",
-                                file=name,
-                            )
-                        counts[entry.topic] += 1
-                        yield entry
-    except FileNotFoundError:
-        raise BadInput("no such file", file=name) from None
-    except _EndError:
-        raise CutOff("is cut off: it ends before its end", file=name) from None
-    except BadInput:
-        raise
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror or error}", file=name) from None
-    except (McapError, ValueError, struct.error, KeyError, IndexError, MemoryError, OverflowError) as error:
-        raise BadInput(f"is no MCAP file, or is damaged: {_words(error)}", file=name) from None
-    if not ended:
-        raise CutOff("is cut off: it ends before its end", file=name)
+    for found in read_records(path, checked=True):
+        if not isinstance(found, Found):
+            continue
+        entry = _entry(found, encoding, name)
+        if entry.seq != counts.setdefault(entry.topic, 0):
+            missing = f"message {counts[entry.topic]} of {entry.topic} is missing"
+            raise BadInput(f"is damaged: {missing}", file=name)
+        counts[entry.topic] += 1
+        yield entry
 
 
-def _entry(message: Any, channels: Mapping[int, Any], encoding: str, name: str) -> Entry:
-    channel = channels[message.channel_id]
+def _entry(found: Found, encoding: str, name: str) -> Entry:
+    channel = found.channel
     if channel.message_encoding != encoding:
         raise BadInput(
             f"{channel.topic[:80]!r} is encoded as {channel.message_encoding[:40]!r}",
             file=name,
             allowed=encoding,
         )
-    digest, data = message.data[:DIGEST_BYTES], message.data[DIGEST_BYTES:]
+    digest, data = found.data[:DIGEST_BYTES], found.data[DIGEST_BYTES:]
     entry = Entry(
-        topic=channel.topic, log_ns=message.log_time, publish_ns=message.publish_time, seq=message.sequence,
-        data=data,
-    )  # fmt: skip
+        topic=channel.topic, log_ns=found.log_ns, publish_ns=found.publish_ns, seq=found.sequence, data=data
+    )
     if entry.digest != digest:
-        raise BadInput(f"message {message.sequence} of {channel.topic} is not what was written", file=name)
+        raise BadInput(f"message {found.sequence} of {channel.topic} is not what was written", file=name)
     return entry
-
-
-def _unpacked(chunk: Any, name: str) -> Any:
-    """The chunk without its compression, its checksum checked."""
-    from mcap.records import Chunk
-
-    size = chunk.uncompressed_size
-    if size > MOST_CHUNK_BYTES:
-        raise BadInput(f"has a chunk of {size} bytes; {MOST_CHUNK_BYTES} are allowed", file=name)
-    data = _decompressed(chunk.compression, chunk.data, size, name)
-    if len(data) != size or (zlib.crc32(data) != chunk.uncompressed_crc):
-        raise BadInput("is damaged: the checksum of a chunk is wrong", file=name)
-    return Chunk(
-        compression="", data=data, message_start_time=chunk.message_start_time,
-        message_end_time=chunk.message_end_time, uncompressed_crc=chunk.uncompressed_crc,
-        uncompressed_size=size,
-    )  # fmt: skip
-
-
-def _decompressed(compression: str, data: bytes, size: int, name: str) -> bytes:
-    """Up to one byte more than `size`, whatever the data say of themselves."""
-    if compression == "":
-        return data
-    if compression == "lz4":
-        import lz4.frame
-
-        try:
-            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1))
-        except (RuntimeError, EOFError) as error:
-            raise BadInput(f"is damaged: a chunk cannot be unpacked ({_words(error)})", file=name) from None
-    if compression != "zstd":
-        raise BadInput(
-            f"has chunks compressed by {compression[:40]!r}", file=name, allowed="lz4, zstd or nothing"
-        )
-    import zstandard
-
-    try:
-        with zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(data) as stream:
-            return bytes(stream.read(size + 1))
-    except zstandard.ZstdError as error:
-        raise BadInput(f"is damaged: a chunk cannot be unpacked ({_words(error)})", file=name) from None
-
-
-class _EndError(Exception):
-    """More was to be read than there is."""
-
-
-class _Bounded:
-    """A file of which no more is asked than it has."""
-
-    def __init__(self, file: BinaryIO, size: int) -> None:
-        self._file, self._left = file, size
-
-    def read(self, size: int = -1) -> bytes:
-        if size < 0 or size > self._left:
-            raise _EndError
-        self._left -= size
-        return self._file.read(size)
-
-
-def _words(error: BaseException) -> str:
-    return (" ".join(str(error).split()) or type(error).__name__)[:120]
