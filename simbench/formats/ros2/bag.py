@@ -92,10 +92,10 @@ def _write(recording: Recording, path: Path) -> Written:
     start_ns = messages[0].arrival_ns if messages else 0
     outs = sorted(_outs(recording, start_ns, epoch_s * names.S_TO_NS), key=lambda out: out.log_ns)
     with writing(path) as file:
-        return _write_all(file, outs, epoch_s, _about(recording, epoch_s))
+        return _write_all(file, outs, epoch_s, _about(recording, epoch_s, outs))
 
 
-def _about(recording: Recording, epoch_s: int) -> dict[str, str]:
+def _about(recording: Recording, epoch_s: int, outs: list[Out]) -> dict[str, str]:
     """The file's metadata record: what ROS has no message for."""
     by_kind = {
         kind.__name__: sorted({m.sensor for m in recording.messages if isinstance(m, kind)})
@@ -108,6 +108,7 @@ def _about(recording: Recording, epoch_s: int) -> dict[str, str]:
         "lidars": json.dumps(by_kind["LidarScan"]),
         "cameras": json.dumps(list(recording.calibration.cameras)),
         "imus": json.dumps(by_kind["EgoMotion"]),
+        "topics": json.dumps(sorted({out.topic for out in outs})),
         "placed": json.dumps(list(recording.calibration.T_ego_sensor)),
     }
 

@@ -21,7 +21,7 @@ MOST_PADDING = 3  # bytes that a middleware may leave behind a message
 _LITTLE = b"\x00\x01\x00\x00"
 
 
-class CdrError(ValueError):
+class MessageError(ValueError):
     """Bytes that are not the message that they should be; one sentence."""
 
 
@@ -33,15 +33,15 @@ def encode(name: str, message: Message) -> bytes:
 
 
 def decode(name: str, data: bytes) -> Message:
-    """The message of bytes. CdrError: they are none, or there are more or fewer than it has."""
+    """The message of bytes. MessageError: they are none, or there are more or fewer than it has."""
     if len(data) < len(_LITTLE):
-        raise CdrError(f"{len(data)} bytes are no message")
+        raise MessageError(f"{len(data)} bytes are no message")
     if data[0] != 0 or data[1] not in (0, 1):
-        raise CdrError(f"its encoding is 0x{data[0]:02x}{data[1]:02x}, not plain CDR")
+        raise MessageError(f"its encoding is 0x{data[0]:02x}{data[1]:02x}, not plain CDR")
     taken = _Taken(data, "<" if data[1] else ">")
     message = taken.message(short(name))
     if not 0 <= len(data) - taken.at <= MOST_PADDING:
-        raise CdrError(f"{len(data) - taken.at} bytes are left over")
+        raise MessageError(f"{len(data) - taken.at} bytes are left over")
     return message
 
 
@@ -101,7 +101,7 @@ def _write_many(out: bytearray, field: Field, value: Any) -> None:
     if field.count is not None and field.count < 0:
         _write_number(out, "uint32", len(value))
     elif len(value) != field.count:
-        raise CdrError(f"'{field.name}' has {len(value)} values, not {field.count}")
+        raise MessageError(f"'{field.name}' has {len(value)} values, not {field.count}")
     if field.kind not in _ONE:
         for one in value:
             _WRITERS.get(field.kind, _write)(out, field.kind, one)
@@ -167,7 +167,7 @@ class _Taken:
             return self._one(field.kind, letter)
         count = int(self._number("I")) if field.count < 0 else field.count
         if count * _least(field.kind) > len(self.data) - self.at:
-            raise CdrError(f"'{field.name}' says it has {count} values, but the message ends before")
+            raise MessageError(f"'{field.name}' says it has {count} values, but the message ends before")
         if letter is None or letter == "s":
             return [self._one(field.kind, letter) for _ in range(count)]
         if letter == "B":
@@ -186,11 +186,11 @@ class _Taken:
         size = int(self._number("I"))
         raw = self._bytes(size)
         if raw and raw[-1]:
-            raise CdrError("a text does not end in a zero")
+            raise MessageError("a text does not end in a zero")
         try:
             return raw[:-1].decode("utf-8")
         except UnicodeDecodeError:
-            raise CdrError("a text is no UTF-8") from None
+            raise MessageError("a text is no UTF-8") from None
 
     def _number(self, letter: str) -> Any:
         size = struct.calcsize(letter)
@@ -199,7 +199,7 @@ class _Taken:
 
     def _bytes(self, size: int) -> bytes:
         if size > len(self.data) - self.at:
-            raise CdrError("it ends before its end")
+            raise MessageError("it ends before its end")
         self.at += size
         return self.data[self.at - size : self.at]
 
