@@ -24,6 +24,7 @@ from simbench.commands.score import score
 from simbench.commands.stress import stress
 from simbench.commands.suite import baseline, compare, plan
 from simbench.commands.timeline import timeline
+from simbench.commands.view import view
 
 BAD_INPUT = 2
 
@@ -68,6 +69,6 @@ def main() -> None:
 
 for verb in (
     baseline, calibrate, check, compare, demo, describe, doctor, explain, frontier, generate, init, learn,
-    list_, plan, run, score, stress, timeline, verify,
+    list_, plan, run, score, stress, timeline, verify, view,
 ):  # fmt: skip
     main.add_command(verb)

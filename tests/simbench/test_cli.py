@@ -110,7 +110,7 @@ def test_every_verb_has_an_example_that_runs(
         (tmp_path / "out" / "run").mkdir(parents=True)
         for name in ("out/run/values.json", "baseline.json"):
             write_side(side(of_smoke, suite="smoke"), tmp_path / name, commands=True)
-    if verb == "verify":
+    if verb in ("verify", "view"):
         monkeypatch.chdir(tmp_path)
         made = ("--system", "car", "--seeds", "0", "--jobs", "1", "--set", "systems.car.duration_s=0.6")
         assert run("generate", "overtake-approach", *made, "--out", "out/generate").exit_code == 0
