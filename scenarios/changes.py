@@ -28,6 +28,25 @@ def changed(tree: Mapping[str, Any], changes: Sequence[str]) -> dict[str, Any]:
     return result
 
 
+def varied(text: str) -> str:
+    """The change of `PATH=LOW..HIGH` (uniform), `PATH=A|B|C` (one of them) or `PATH=DISTRIBUTION`, as
+    `--vary` asks for it. BadInput: it leaves nothing to the seed."""
+    where = Where(file="--vary")
+    path, equals, value = (part.strip() for part in text.partition("="))
+    if not equals or not path or not value:
+        raise where.error(f"is PATH=LOW..HIGH, as in road.width_m=30..60; this is {show(text)}")
+    low, dots, high = value.partition("..")
+    if value.startswith("{"):
+        return text
+    if dots:
+        return f"{path}={{uniform: [{low}, {high}]}}"
+    if "|" in value:
+        return f"{path}={{choice: [{', '.join(value.split('|'))}]}}"
+    raise where.error(
+        f"{path}: {show(value)} leaves nothing to the seed", allowed="LOW..HIGH, A|B|C or a distribution"
+    )
+
+
 def _set(tree: Any, path: str, value: Any, where: Where) -> None:
     *way, last = path.split(".")
     for word in way:

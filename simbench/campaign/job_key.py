@@ -13,11 +13,11 @@ from typing import Any
 
 from simbench.campaign.key import OURS, files_of, sha256_of, task_key
 from simbench.case import Job
+from simbench.formats.targets import is_recorded
 from simbench.plugins import GROUP
 
 SMALL_BYTES = 1_000_000
 """Of recorded data larger files are told apart by name and size."""
-KITTI = "kitti:"
 
 
 def job_key(job: Job, **more: Any) -> str:
@@ -55,8 +55,8 @@ def _module(top: str) -> Iterable[bytes]:
 
 def _files(job: Job) -> dict[str, str]:
     """Hashes by name of all files that a job's words name, and of what those name in turn."""
-    if job.scenario.startswith(KITTI):
-        return {job.scenario: _recorded(Path(job.scenario.removeprefix(KITTI)))}
+    if is_recorded(job.scenario):
+        return {job.scenario: _recorded(Path(job.scenario.partition(":")[2]))}
     words = [job.scenario, job.found_in or "", job.calibration.partition(":")[2]]
     words += [part for text in (*job.faults, *job.changes) for part in (text, text.partition("=")[2])]
     found = {word: digest for word in words if (digest := _named(word))}

@@ -10,22 +10,22 @@ from pathlib import Path
 
 from scenarios.errors import BadInput
 from scenarios.load import Family, load_scenario
-from simbench.case import Job
 from simbench.formats.store import write_recording
-from simbench.generate.work import size_of, source_of
+from simbench.generate.work import Task, size_of, source_of, write_as
 from simbench.run import recording_of
 
 SPARE = 1.2  # of the estimate: drives of a family differ
 
 
-def estimate_bytes(jobs: Sequence[Job], out: Path) -> int:
-    """Of all recordings together. Raises BadInput."""
+def estimate_bytes(tasks: Sequence[Task], out: Path) -> int:
+    """Of all recordings together, in all their formats. Raises BadInput."""
     drives: dict[tuple[str, tuple[str, ...], str, str], tuple[Family, float]] = {}
     total = 0.0
-    for job in jobs:
+    for task in tasks:
+        job = task.job
         drive = (job.scenario, job.changes, job.system, job.images)
         if drive not in drives:
-            drives[drive] = load_scenario(job.scenario, job.changes), _second_bytes(job, out)
+            drives[drive] = load_scenario(job.scenario, job.changes), _second_bytes(task, out)
         family, second = drives[drive]
         total += family.resolve(job.seed).system(job.system).duration_s * second
     return int(total)
@@ -41,11 +41,14 @@ def check_room(needed_bytes: int, out: Path) -> None:
         )
 
 
-def _second_bytes(job: Job, out: Path) -> float:
+def _second_bytes(task: Task, out: Path) -> float:
+    job = task.job
     short = replace(
         job, seed=0, faults=("none",), changes=(*job.changes, f"systems.{job.system}.duration_s=1")
     )
     _, _, made = recording_of(short)
     with tempfile.TemporaryDirectory(dir=out, prefix=".") as folder:
         write_recording(made.recording, Path(folder) / "pilot", source_of(short))
-        return float(size_of(Path(folder) / "pilot"))
+        pilot = replace(task, job=short, out=folder, name="pilot")
+        others = sum(write_as(one, made.recording, pilot) for one in task.formats)
+        return float(size_of(Path(folder) / "pilot") + others)

@@ -8,6 +8,7 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 from unittest import mock
 
 import pytest
@@ -16,17 +17,20 @@ from scenarios.errors import BadInput
 from simbench.case import Job
 from simbench.formats.store import MANIFEST, MESSAGES
 from simbench.generate import work
-from simbench.generate.command import NAME, generate_recordings
+from simbench.generate.command import NAME, Request, generate_recordings
+from simbench.generate.require import parse_requirement
+from simbench.generate.split import part_of
 from simbench.generate.verify import verified
 from simbench.run import Made, recording_of
 
 FIRST = "overtake-approach-car-0000"
+SHORT = ("systems.car.duration_s=0.6",)
 
 
-def ask(out: Path, seeds: tuple[int, ...] = (0, 1), workers: int = 1, **more: object) -> int:
-    asked = {"targets": ["overtake-approach"], "system": "car", "faults": ("timing.trigger_offset_ms=50",)}
-    asked |= {"changes": ("systems.car.duration_s=0.6",), "images": "none"} | more
-    return generate_recordings(seeds=seeds, workers=workers, out=out, **asked)  # type: ignore[arg-type]
+def ask(out: Path, seeds: tuple[int, ...] = (0, 1), workers: int = 1, **more: Any) -> int:
+    usual = {"targets": ("overtake-approach",), "system": "car", "faults": ("timing.trigger_offset_ms=50",)}
+    usual |= {"changes": SHORT}
+    return generate_recordings(Request(seeds=seeds, workers=workers, out=out, **(usual | more)))
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +116,16 @@ def test_a_full_disk_is_said_before_anything_is_made(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"targets": ["overtake-approach", "overtake-approach"]}, "two recordings would be called"),
-        ({"targets": ["overtake-aproach"]}, "did you mean"),
+        (
+            {
+                "targets": (
+                    "overtake-approach",
+                    "overtake-approach",
+                )
+            },
+            "two recordings would be called",
+        ),
+        ({"targets": ("overtake-aproach",)}, "did you mean"),
         ({"faults": ("timing.trigger_offset_ms=nan",)}, "trigger_offset"),
     ],
 )
@@ -147,3 +159,36 @@ def test_progress_says_size_and_time(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert ask(tmp_path, seeds=(0,)) == 0
     told = re.escape(f"[1/1] {FIRST}: ok, ") + r"\d\.\d MB, .* s to make, .* s to write \(0\.0 min left\)"
     assert re.search(told, capsys.readouterr().err)
+
+
+def test_drives_that_do_not_hold_what_is_required_are_counted_and_not_kept(tmp_path: Path) -> None:
+    required = (parse_requirement("nearest_m<=27.9"),)
+    vary = ("systems.car.actors.car.path.speed_mps={uniform: [9, 15]}",)
+    assert ask(tmp_path, seeds=tuple(range(4)), required=required, changes=(*SHORT, *vary)) == 0
+    kept = {row["name"]: row["status"] for row in rows(tmp_path)}
+    assert set(kept.values()) == {"ok", "rejected"}, kept
+    for row in rows(tmp_path):
+        assert (tmp_path / str(row["name"])).is_dir() == (row["status"] == "ok")
+        assert row["status"] == "ok" or "nearest_m<=27.9: 2" in str(row["why"])
+    page = (tmp_path / "card.html").read_text(encoding="utf-8")
+    assert "draws were made and not kept" in page and "nearest_m&lt;=27.9" in page
+
+
+def test_other_formats_lie_beside_the_recording(tmp_path: Path) -> None:
+    assert ask(tmp_path, seeds=(0,), formats=("mcap", "kitti", "pcd")) == 0
+    for kind, suffix in (("mcap", ".mcap"), ("kitti", ".bin"), ("pcd", ".pcd")):
+        assert list((tmp_path / kind / FIRST).rglob(f"*{suffix}")), kind
+    (row,) = rows(tmp_path)
+    files = [path for path in tmp_path.rglob("*") if path.is_file() and FIRST in str(path)]
+    assert row["size_bytes"] == sum(path.stat().st_size for path in files)
+    assert not [path for path in tmp_path.rglob(".*") if path.is_dir()]
+
+
+def test_both_rigs_of_a_drive_are_in_the_same_part(tmp_path: Path) -> None:
+    changes = ("systems.car.duration_s=0.3", "systems.wearable.duration_s=0.3")
+    asked = {"system": None, "changes": changes, "faults": ("none",), "shares": (50.0, 25.0, 25.0)}
+    assert ask(tmp_path, seeds=tuple(range(5)), **asked) == 0
+    part = {(row["system"], row["seed"]): row["split"] for row in rows(tmp_path)}
+    for seed in range(5):
+        assert part["car", seed] == part["wearable", seed] == part_of("overtake-approach", seed, (50, 25, 25))
+    assert len(set(part.values())) > 1
