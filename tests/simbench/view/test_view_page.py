@@ -29,12 +29,14 @@ def run(*words: str) -> Result:
 # -- safe wherever it is opened -----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [EVIL, "<!--<script>", "a&b <i>\"'", "\u2028"])
+@pytest.mark.parametrize("name", [EVIL, "<!--<script>", "a&b <i>\"'", "</script x", "\u2028"])
 def test_no_name_of_a_file_becomes_markup(stored: Stored, name: str) -> None:
     plain, elements = Elements(page_of(stored)), Elements(page_of(renamed(stored, name)))
     assert [tag for tag, _ in elements.tags] == [tag for tag, _ in plain.tags]
     assert elements.scripts.keys() == {"look", "seen", "hidden", ""}
     assert elements.scripts[""] == plain.scripts[""]
+    for data in ("look", "seen", "hidden"):
+        assert not set("<>&") & set(elements.scripts[data]), "not even half a tag"
     (target,) = (o for o in block(page_of(renamed(stored, name)), "hidden")["objects"] if o["target"])
     assert target["name"] == ("?" if name == "\u2028" else name)
 
