@@ -24,6 +24,8 @@ MOST_CHUNK_BYTES = 512 * 2**20  # one message may be a picture or a long sweep
 MOST_GROWTH = 1000  # times the file's size, of all chunks together; zeros grow more, no recording does
 FREE_BYTES = 64 * 2**20  # that may be unpacked whatever the file's size
 MAGIC = b"\x89MCAP0\r\n"  # what every MCAP file begins with
+BYTES_A_RECORD = 4  # of the file, at least, however well it is packed
+FREE_RECORDS = 100_000
 COMPRESSIONS = ("lz4", "zstd", "")
 _HEAD = struct.Struct("<BQ")  # opcode, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
@@ -66,7 +68,7 @@ def read_records(
                 raise BadInput("is no MCAP file", file=name)
             file.seek(0)
             bounded = _Bounded(file, size)
-            reading = _Reading(name=name, checked=checked, most=most_chunk_bytes, left=_room(size))
+            reading = _Reading(name=name, checked=checked, most=most_chunk_bytes, size=size)
             yield from reading.records(bounded, size)
             ended = reading.ended
     except FileNotFoundError:
@@ -83,16 +85,14 @@ def read_records(
         raise CutOff("is cut off: it ends before its end", file=name)
 
 
-def _room(size: int) -> int:
-    """Bytes that all chunks of a file may have together."""
-    return FREE_BYTES + MOST_GROWTH * size
-
-
 class _Reading:
-    """What is known of a file while it is read. left: bytes that may still be unpacked."""
+    """What is known of a file of `size` bytes while it is read. bytes_left: that may still be unpacked;
+    records_left: that may still be met in chunks."""
 
-    def __init__(self, *, name: str, checked: bool, most: int, left: int) -> None:
-        self.name, self.checked, self.most, self.left = name, checked, most, left
+    def __init__(self, *, name: str, checked: bool, most: int, size: int) -> None:
+        self.name, self.checked, self.most = name, checked, most
+        self.bytes_left = FREE_BYTES + MOST_GROWTH * size
+        self.records_left = FREE_RECORDS + size // BYTES_A_RECORD
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
         self.ended = False
@@ -130,8 +130,11 @@ class _Reading:
         while at < len(data):
             code, length = _HEAD.unpack_from(data, at)
             begin, at = at + _HEAD.size, at + _HEAD.size + length
+            self.records_left -= 1
             if at > len(data):
                 raise ValueError("a record reaches beyond its chunk")
+            if self.records_left < 0:
+                raise BadInput("has more messages than a file of its size can hold", file=self.name)
             if code == _MESSAGE_CODE:
                 if length < _MESSAGE.size:
                     raise ValueError(f"a message of {length} bytes")
@@ -157,8 +160,8 @@ class _Reading:
         size = chunk.uncompressed_size
         if size > self.most:
             raise BadInput(f"has a chunk of {size} bytes; {self.most} are allowed", file=self.name)
-        self.left -= size
-        if self.left < 0:
+        self.bytes_left -= size
+        if self.bytes_left < 0:
             raise BadInput(f"unpacks to more than {MOST_GROWTH} times its size", file=self.name)
         if chunk.compression not in COMPRESSIONS:
             raise BadInput(

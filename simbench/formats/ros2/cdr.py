@@ -132,7 +132,7 @@ def _flat(kind: str, message: Message) -> list[float]:
     for field in fields_of(kind):
         value = message.get(field.name)
         if field.kind == "float64":
-            found.append(value or 0.0)
+            found.append(0.0 if value is None else value)
         else:
             found += _flat(field.kind, value or {})
     return found

@@ -18,7 +18,7 @@ from simbench.formats.ros2.topics import LidarTopics, PointTime
 MOST_POINTS = 10_000_000
 LONGEST_NS = 2**31 - 1  # of a sweep, from its stamp
 MOST_NS = 4e18  # what 64 bits can say, and a stamp more
-NO_RING, UNKNOWN_RING = -1, 65535
+NO_RING, UNKNOWN_RING, MOST_RING = -1, 65535, 32767
 DATATYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 8: "f8"}  # sensor_msgs/PointField
 NS = {"s": 1e9, "us": 1e3, "ns": 1.0}
 
@@ -134,10 +134,12 @@ def _rings(points: np.ndarray, field: str | None) -> Int16[np.ndarray, " n"]:
     ring = _column(points, field)
     if ring.dtype.kind == "f" and not (np.isfinite(ring).all() and (ring == np.floor(ring)).all()):
         raise MessageError("a ring is no whole number")
-    ring = np.where(ring == UNKNOWN_RING, NO_RING, ring)
-    if len(ring) and (ring.min() < NO_RING or ring.max() > np.iinfo(np.int16).max):
-        raise MessageError(f"a ring is {int(ring.max())}, more than {np.iinfo(np.int16).max}, or negative")
-    return ring.astype(np.int16)
+    with np.errstate(all="ignore"):  # a float beyond 64 bits becomes negative
+        wide = ring.astype(np.int64)
+    wide[wide == UNKNOWN_RING] = NO_RING
+    if len(wide) and not NO_RING <= wide.min() <= wide.max() <= MOST_RING:
+        raise MessageError(f"its rings are {wide.min()} to {wide.max()}, not 0 to {MOST_RING}")
+    return wide.astype(np.int16)
 
 
 def _offsets(given: np.ndarray, time: PointTime, stamp_ns: int) -> np.ndarray:
