@@ -53,7 +53,7 @@ def write_tracking_layout(drive: WrittenDrive, folder: Path, number: int) -> Non
         write_sweep(frame.scan, folder / f"velodyne/{name}/{index:06d}.bin")
         write_picture(frame, drive.lens, folder / f"image_02/{name}/{index:06d}.png")
         lines += [
-            f"{index} {label.object_id} {_tracking_words(label)}"
+            f"{index} {label.object_id} {tracking_words(label)}"
             for label in frame.labels
             if label.known and label.box_px is not None
         ]
@@ -64,7 +64,8 @@ def write_tracking_layout(drive: WrittenDrive, folder: Path, number: int) -> Non
         write_text(folder / f"oxts/{name}.txt", "".join(line + "\n" for line in motion))
 
 
-def _tracking_words(label: Labelled) -> str:
+def tracking_words(label: Labelled) -> str:
+    """A label of the tracking layout after frame and track."""
     kind = kind_of(label.category)
     assert kind is not None
     outside = int(label.outside >= PARTLY_OUTSIDE)

@@ -40,9 +40,8 @@ def oxts_numbers(frame: WrittenFrame, start_m: Float64[np.ndarray, "3"]) -> list
     roll, pitch, yaw = roll_pitch_yaw(R)
     level = rotation_rpy(roll, pitch, 0.0)  # from the box's axes to forward, left, up along the ground
     v, a, w = ego.velocity_mps, ego.specific_force_mps2, ego.rate_radps
-    east, north, _ = R @ v
     return [
-        lat_deg, lon_deg, at_m[2], roll, pitch, yaw, north, east,
+        lat_deg, lon_deg, at_m[2], roll, pitch, yaw, *velocity_north_east(R, v),
         *v, *a, *(level @ a), *w, *(level @ w), *ACCURACY,
     ]  # fmt: skip
 
@@ -54,6 +53,14 @@ def lat_lon_deg(east_north_m: Float64[np.ndarray, " n"]) -> tuple[float, float]:
     start = np.log(np.tan((90.0 + LAT_DEG) * np.pi / 360.0))
     lat_deg = np.arctan(np.exp(start + east_north_m[1] / scale)) * 360.0 / np.pi - 90.0
     return float(lat_deg), float(lon_deg)
+
+
+def velocity_north_east(
+    R_world_ego: Float64[np.ndarray, "3 3"], velocity_mps: Float64[np.ndarray, "3"]
+) -> tuple[float, float]:
+    """Of a velocity in the box's axes."""
+    east, north, _ = R_world_ego @ velocity_mps
+    return float(north), float(east)
 
 
 def roll_pitch_yaw(rotation: Float64[np.ndarray, "3 3"]) -> tuple[float, float, float]:

@@ -112,6 +112,23 @@ def test_what_was_read_from_kitti_scores_the_same_after_writing(
         assert [box.visible_fraction for box in one.boxes] == [box.visible_fraction for box in other.boxes]
 
 
+def test_an_object_that_no_sensor_saw_keeps_its_label(tmp_path: Path) -> None:
+    """Behind the camera, beyond the LiDAR: the truth is the label alone."""
+    far = replace(mini.CAR, track=11, xyz_m=(-120.0, 3.0, -mini.HEIGHT_M), truncated=99)
+    root = mini.write_raw(tmp_path / "raw", [(mini.RIDER, far)] * 2)
+    was = play(root, 5)
+    assert not any((scan.object_id == 1).any() for scan in was.truth.scans)
+    now = there_and_back(was, tmp_path / "new", "raw", 5)
+    assert [(o.category, o.size_m) for o in now.truth.objects] == [
+        (o.category, o.size_m) for o in was.truth.objects
+    ]
+    at = np.array([0, 50_000_000])
+    for one, other in zip(
+        was.truth.poses.object_centre(1, at), now.truth.poses.object_centre(1, at), strict=True
+    ):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="the three KITTI frames are not here")
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_a_real_frame_scores_the_same_after_writing(tmp_path: Path, number: int) -> None:

@@ -19,7 +19,7 @@ from fusion.messages import Calibration, CameraImage, Detections, EgoMotion, Lid
 from simbench.case import Job
 from simbench.formats.kitti_write import write_kitti, write_kitti_object, write_kitti_raw
 from simbench.formats.kitti_write.files import kitti_order
-from simbench.formats.kitti_write.rectify import straight_image
+from simbench.formats.kitti_write.rectify import straight_box, straight_image
 from simbench.formats.rings import rings_of
 from simbench.recording import Recording
 from simbench.run import recording_of
@@ -345,3 +345,13 @@ def test_pictures_and_boxes_of_a_bent_lens_are_straightened(made: Recording, tmp
     written = read(root / "2000_01_01_drive_0000_sync/image_02/data/0000000000.png")
     np.testing.assert_array_equal(written, straight_image(drawn, lens))
     assert (written != drawn).mean() > 0.5
+    write_kitti(pictured(made, lens), tmp_path / "frames", layout="object")
+    first = next(i for i in made.truth.images if (i.sensor, i.seq) == ("cam-front", 0))
+    bent = {b.object_id: b.amodal_px for b in first.boxes}
+    for line in (tmp_path / "frames/training/label_2/000000.txt").read_text().splitlines():
+        kind, *numbers = line.split()
+        if kind != "DontCare":
+            was = bent[name_by_size(made, map(float, numbers[7:10])).object_id]
+            wanted = straight_box(was, lens)
+            assert wanted is not None and wanted != was
+            np.testing.assert_allclose([float(n) + 0.5 for n in numbers[3:7]], wanted, atol=1e-9)

@@ -15,11 +15,13 @@ from fusion.geometry import rotation_exp, rotation_rpy
 from fusion.messages import LidarScan
 from simbench.formats.kitti_write.files import kitti_order
 from simbench.formats.kitti_write.kinds import kind_of, occlusion
+from simbench.formats.kitti_write.lines import tracking_words
+from simbench.formats.kitti_write.objects import Labelled
 from simbench.formats.kitti_write.outline import outside_share
-from simbench.formats.kitti_write.oxts import roll_pitch_yaw
+from simbench.formats.kitti_write.oxts import lat_lon_deg, roll_pitch_yaw, velocity_north_east
 from simbench.formats.kitti_write.rectify import straight, straight_box, straight_image
 from simbench.formats.kitti_write.text import time_text
-from simbench.formats.kitti_write.tracklets import heading_of
+from simbench.formats.kitti_write.tracklets import heading_of, levels
 
 LENS = PinholeCamera(fx_px=500.0, fy_px=480.0, cx_px=320.0, cy_px=200.0, width_px=640, height_px=400)
 BARREL = replace(LENS, distortion=(-0.12, 0.02, 0.001, -0.0005, 0.0))
@@ -137,3 +139,77 @@ def test_a_straightened_box_holds_what_the_old_one_held(
     assert (right >= np.array(found[:2]) - 0.2).all() and (right <= np.array(found[2:]) + 0.2).all()
     grown = (found[2] - found[0]) * (found[3] - found[1]) / np.prod(right.max(axis=0) - right.min(axis=0))
     assert grown < 1.5
+
+
+def labelled(visible: float, outside: float, *, shown: bool = True, behind: bool = False) -> Labelled:
+    return Labelled(
+        object_id=5, category="person_sitting", size_m=(0.8, 0.6, 1.2), centre_m=np.array([1.0, 0.5, 9.0]),
+        yaw_rad=0.25, box_px=(10.5, 20.5, 30.5, 60.5) if shown else None, visible_fraction=visible,
+        outside=outside, behind=behind, known=True,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("label", "occluded", "truncated"),
+    [
+        (labelled(1.0, 0.0), 0, 0),
+        (labelled(1.0, 0.2), 0, 0),
+        (labelled(1.0, 0.3), 0, 1),
+        (labelled(0.5, 0.0), 1, 0),
+        (labelled(0.5, 0.3), 0, 1),  # read from "occlusion 0, truncation 1"
+        (labelled(0.2, 0.0), 2, 0),
+        (labelled(0.0, 0.0), 2, 0),
+        (labelled(0.0, 0.9), 2, 1),
+        (labelled(0.0, 1.0, shown=False), -1, 2),
+        (labelled(0.0, 1.0, shown=False, behind=True), -1, 99),
+    ],
+)
+def test_levels_of_a_tracklet(label: Labelled, occluded: int, truncated: int) -> None:
+    assert levels(label) == (occluded, truncated)
+
+
+@pytest.mark.parametrize(
+    ("label", "truncated", "occluded"),
+    [
+        (labelled(1.0, 0.0), "0", "0"),
+        (labelled(1.0, 0.2), "0", "0"),
+        (labelled(1.0, 0.3), "1", "0"),
+        (labelled(0.3, 0.6), "1", "1"),  # read from "1 1"
+        (labelled(0.0, 0.0), "2", "2"),
+    ],
+)
+def test_levels_of_a_tracking_label(label: Labelled, truncated: str, occluded: str) -> None:
+    kind, *words = tracking_words(label).split()
+    assert (kind, words[0], words[1]) == ("Person", truncated, occluded)
+    assert [float(word) for word in words[3:]] == [
+        10.0, 20.0, 30.0, 60.0, 1.2, 0.6, 0.8, 1.0, 0.5 + 0.6, 9.0, 0.25,
+    ]  # fmt: skip
+
+
+def test_a_hundred_metres_east_and_north_by_the_devkits_formula() -> None:
+    lat, lon = lat_lon_deg(np.array([100.0, 70.0, 0.0]))
+    scale = np.cos(np.deg2rad(49.0)) * 6378137.0
+    north = [scale * np.log(np.tan((90 + v) * np.pi / 360)) for v in (49.0, lat)]
+    assert scale * np.deg2rad(lon - 8.4) == pytest.approx(100.0, abs=1e-6)
+    assert north[1] - north[0] == pytest.approx(70.0, abs=1e-6)
+
+
+def test_ahead_is_north_for_who_looks_north() -> None:
+    north, east = velocity_north_east(rotation_rpy(0.0, 0.0, np.pi / 2), np.array([5.0, 1.0, 0.0]))
+    assert (north, east) == pytest.approx((5.0, -1.0))
+
+
+def test_a_straightened_ramp_has_the_height_that_the_lens_drew_there() -> None:
+    """Brightness tells the column to a thirtieth of a pixel, at the border of a strong lens."""
+    strong = replace(LENS, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0))
+    bent_column = strong.project(np.array([[0.5, 0.0, 1.0]]))[0, 0]
+    start = round(bent_column - 4.0)
+    ramp = np.clip(30.0 * (np.arange(640) - start), 0, 250)
+    picture = np.repeat(np.tile(ramp, (400, 1))[..., None], 3, axis=2).astype(np.uint8)
+    found = straight_image(picture, strong)[200, :, 0].astype(float)
+    inner = np.flatnonzero((found > 20) & (found < 230))
+    assert len(inner) >= 5
+    x = (inner + 0.5 - LENS.cx_px) / LENS.fx_px
+    y = np.full_like(x, (200.5 - LENS.cy_px) / LENS.fy_px)
+    wanted = strong.project(np.stack([x, y, np.ones_like(x)], axis=1))[:, 0] - 0.5
+    np.testing.assert_allclose(start + found[inner] / 30.0, wanted, atol=0.05)
