@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from fusion.messages import Calibration, CategorySize, Measurement
+from simbench.log import Log
 from simbench.truth import Truth
 
 
@@ -18,6 +19,11 @@ class Recording:
     categories: Mapping[str, CategorySize]
     messages: tuple[Measurement, ...]
     truth: Truth
+
+    @property
+    def log(self) -> Log:
+        """What pipelines get."""
+        return Log(calibration=self.calibration, categories=self.categories, messages=self.messages)
 
     @property
     def by_target(self) -> tuple[Recording, ...]:

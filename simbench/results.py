@@ -31,7 +31,7 @@ def record_of(result: JobResult) -> dict[str, list[dict[str, Any]]]:
     return {
         "rows": [row for case in result.cases for row in _rows(result, case)],
         "cases": [_case(result, case) for case in result.cases],
-        "timings": [row for case in result.cases for row in _timings(result, case)],
+        "timings": [row for case in result.cases for row in timing_rows(_key(result, case), case)],
     }
 
 
@@ -153,11 +153,10 @@ def latency_ms(case: Case) -> dict[str, tuple[float, int]]:
     return values
 
 
-def _timings(result: JobResult, case: Case) -> Iterable[dict[str, Any]]:
+def timing_rows(key: Mapping[str, Any], case: Case) -> Iterable[dict[str, Any]]:
+    """Entries of `timings` under a case's key."""
     for metric, (value, n) in latency_ms(case).items():
-        yield {
-            **_key(result, case), "metric": metric, "value": value, "unit": "ms", "better": "lower", "n": n,
-        }  # fmt: skip
+        yield {**key, "metric": metric, "value": value, "unit": "ms", "better": "lower", "n": n}
 
 
 def _table(results: Sequence[JobResult], what: str) -> str:

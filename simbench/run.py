@@ -27,6 +27,7 @@ from simbench.formats.targets import is_recorded
 from simbench.isolate.ask import runs_apart
 from simbench.isolate.drive import drive_isolated
 from simbench.isolate.limits import DEFAULT, Failed, Isolate, Limits, TimedOut
+from simbench.log import Log
 from simbench.plugins import last_line, load_pipeline
 from simbench.recording import Recording
 from simbench.score.contract import ContractError
@@ -132,9 +133,9 @@ def judge(
     clock.lap("fusion and scores")
     if made.recording.truth.target_id is not None:
         cases.append(scored(ORACLE, score_oracles(made.recording), None))
-    driven = {case.pipeline: case.driven.outputs for case in cases if case.driven is not None}
-    views = pair_views(made.recording, driven)
-    curves = distances(made.recording, driven, others)
+    answers = {case.pipeline: case.driven.outputs for case in cases if case.driven is not None}
+    views = pair_views(made.recording, answers)
+    curves = distances(made.recording, answers, others)
     clock.lap("oracle and views")
     why = mismatch(made.receipts)
     return tuple(spoiled(case, why) if why else case for case in cases), views, curves
@@ -151,28 +152,30 @@ class HasRecording(Protocol):
 def run_case(name: str, made: HasRecording, isolate: Isolate = "users", limits: Limits = DEFAULT) -> Case:
     """One pipeline on one recording; what it does wrong is its status, never ours."""
     recording = made.recording
-    apart = runs_apart(name, isolate)
-    driven = _driven_apart(name, recording, limits) if apart else _driven_here(name, recording)
-    if isinstance(driven, Case):
-        return driven
+    found = driven(name, recording.log, isolate, limits)
+    if isinstance(found, Case):
+        return found
     try:
-        return scored(name, score_objects(recording, driven.outputs, driven.trajectories), driven)
+        return scored(name, score_objects(recording, found.outputs, found.trajectories), found)
     except ContractError as error:
         return failed(name, "pipeline_error", str(error))
 
 
-def _driven_here(name: str, recording: Recording) -> Driven | Case:
+def driven(name: str, log: Log, isolate: Isolate = "users", limits: Limits = DEFAULT) -> Driven | Case:
+    """What a pipeline answers to a drive, or the case that failed."""
+    return _driven_apart(name, log, limits) if runs_apart(name, isolate) else _driven_here(name, log)
+
+
+def _driven_here(name: str, log: Log) -> Driven | Case:
     try:
-        pipeline = load_pipeline(name)()
-        return drive(pipeline, recording.calibration, recording.categories, recording.messages)
+        return drive(load_pipeline(name)(), log.calibration, log.categories, log.messages)
     except Exception as error:  # a pipeline may raise anything
         return failed(name, "pipeline_error", last_line(error))
 
 
-def _driven_apart(name: str, recording: Recording, limits: Limits) -> Driven | Case:
-    told = (recording.calibration, recording.categories, recording.messages)
+def _driven_apart(name: str, log: Log, limits: Limits) -> Driven | Case:
     try:
-        return drive_isolated(name, *told, limits)
+        return drive_isolated(name, log.calibration, log.categories, log.messages, limits)
     except TimedOut as error:
         return failed(name, "timeout", str(error))
     except Failed as error:

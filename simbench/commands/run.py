@@ -89,15 +89,19 @@ def demo(
     "--calibration", default="true", show_default=True, metavar="true|found[:FILE]",
     help="What the pipelines are told: the truth, or what 'simbench calibrate' finds (or wrote to FILE).",
 )  # fmt: skip
+@click.option(
+    "--topics", type=click.Path(path_type=Path), default=None, metavar="FILE",
+    help="Of mcap:PATH: which topic is which sensor (docs/formats.md). Not needed for bags of simbench's.",
+)  # fmt: skip
 @of_suites
 @isolation
 @common("out/run")
 def run(
     targets: tuple[str, ...], system: str, pipelines: tuple[str, ...], faults: tuple[str, ...],
     changes: tuple[str, ...], off: tuple[str, ...], alone: bool,
-    boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, seeds: tuple[int, ...],
-    images: Images, jobs: int | None, out: Path, as_json: bool, size: tuple[int, int] | None,
-    apart: dict[str, Any], suite: dict[str, Any],
+    boxes: Boxes | None, span: tuple[int, int] | None, calibration: str, topics: Path | None,
+    seeds: tuple[int, ...], images: Images, jobs: int | None, out: Path, as_json: bool,
+    size: tuple[int, int] | None, apart: dict[str, Any], suite: dict[str, Any],
 ) -> None:  # fmt: skip
     """Run a suite, or scenarios (names or .yaml files), through pipelines; write result.json and report.html.
 
@@ -107,7 +111,8 @@ def run(
     Of scenarios: where errors are injected, the same drives are also run with errors off. A target
     kitti:FOLDER is recorded data: every frame (object layout), sequence or drive is a run, called by its
     number; --seeds picks some. A FOLDER that 'simbench generate' wrote (or rec:FOLDER) is played as it was
-    made.
+    made. mcap:PATH is a ROS 2 bag (--topics says which topic is which sensor): nobody knows its truth, so
+    answers are only held against each other.
 
     Example: simbench run overtake-approach --system car --faults timing.trigger_offset_ms=50 --seeds 0-1
     """
@@ -119,11 +124,15 @@ def run(
     from simbench.case import Job
     from simbench.formats.jobs import plan_recorded
     from simbench.formats.stored import stored_target
-    from simbench.formats.targets import is_recorded
+    from simbench.formats.targets import MCAP, is_recorded
     from simbench.isolate.ask import check_pipeline_name
     from simbench.stage import faults_of
 
     targets = tuple(stored_target(target) or target for target in targets)
+    if len(targets) == 1 and targets[0].startswith(MCAP):
+        _run_imported(targets[0], topics, pipelines, out, as_json, apart, suite)
+    if topics is not None:
+        raise click.UsageError("--topics is for a ROS 2 bag (mcap:PATH)")
     if _is_suite(targets, suite):
         _run_suite(targets, pipelines, seeds, jobs, out, as_json, apart, suite)
     chosen = tuple(dict.fromkeys(pipelines)) or DEFAULT
@@ -168,6 +177,31 @@ def run(
                 planned.append(job)
     pictures = images if any(job.images != "none" for job in planned) else "none"
     execute(planned, out, pictures, jobs, as_json)
+
+
+def _run_imported(
+    target: str, topics: Path | None, pipelines: tuple[str, ...], out: Path, as_json: bool,
+    apart: dict[str, Any], suite: dict[str, Any],
+) -> NoReturn:  # fmt: skip
+    """UsageError: an option that is for drives whose truth is known."""
+    import shlex
+    import sys
+
+    from simbench.imported.command import Asked, run_imported
+    from simbench.isolate.ask import check_pipeline_name
+
+    source = click.get_current_context().get_parameter_source
+    for name in (*FOR_SCENARIOS, "seeds", *suite):
+        if source(name) not in (ParameterSource.DEFAULT, None):
+            raise click.UsageError(f"{_option(name)} is not for a ROS 2 bag")
+    chosen = tuple(dict.fromkeys(pipelines)) or DEFAULT
+    for name in chosen:
+        check_pipeline_name(name)
+    asked = Asked(
+        target=target, topics=topics, pipelines=chosen, out=out, as_json=as_json,
+        command=shlex.join(["simbench", *sys.argv[1:]]), **apart,
+    )  # fmt: skip
+    raise SystemExit(run_imported(asked))
 
 
 FOR_SCENARIOS = (

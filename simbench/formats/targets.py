@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 KITTI = "kitti:"
+MCAP = "mcap:"  # a ROS 2 bag: nobody knows the truth
 STORED = "rec:"  # a folder that `simbench generate` wrote
 
 
