@@ -26,7 +26,9 @@ def quaternions_of(rotations: Float64[np.ndarray, "n 3 3"]) -> Float64[np.ndarra
 def matrix_of(quaternion: Quaternion) -> Float64[np.ndarray, "3 3"]:
     """The rotation matrix of a quaternion. ValueError: its length is not 1 (to 1e-3), or no number."""
     given = np.asarray(quaternion, dtype=np.float64)
-    length = float(np.linalg.norm(given)) if np.isfinite(given).all() else np.nan
+    length = (
+        float(np.linalg.norm(given)) if np.abs(given).max() < 2.0 else np.inf
+    )  # NaN is no rotation either
     if not abs(length - 1.0) < LEAST_UNIT:
         raise ValueError(f"a quaternion of length {length:g}")
     x, y, z, w = given / length

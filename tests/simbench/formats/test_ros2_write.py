@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,14 +17,16 @@ from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.interfaces import QosDurability
 
-from fusion.geometry import Transform
+from fusion.geometry import Transform, rotation_rpy
 from fusion.messages import CameraImage, Detections, EgoMotion, LidarScan
 from scenarios.errors import BadInput
 from simbench.formats.ros2 import definitions as ros
 from simbench.formats.ros2.bag import write_bag, write_ros2
 from simbench.formats.ros2.foxglove import layout
 from simbench.formats.ros2.names import EPOCH_S
+from simbench.formats.ros2.truth import truth_messages
 from simbench.recording import Recording
+from simbench.truth import PoseSource, Truth
 from tests.simbench.formats.ros2_drives import SIZE_PX, drive, shifted
 from tests.simbench.formats.ros2_foreign import typestore
 
@@ -193,6 +195,41 @@ def test_true_boxes_stand_where_the_objects_are_when_a_scan_begins(read: Read) -
     target = truth.target_centre_ego_m(t_ns)[0]
     p = markers.markers[truth.target_id].pose.position
     assert [p.x, p.y, p.z] == pytest.approx(target, abs=1e-9)
+
+
+@dataclass(frozen=True)
+class Turned:
+    """The same world, turned and moved as a whole."""
+
+    poses: PoseSource
+    rotation: np.ndarray
+
+    def _turned(self, pose: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        return self.rotation @ pose[0], pose[1] @ self.rotation.T + [5.0, -3.0, 1.0]
+
+    def ego(self, t_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._turned(self.poses.ego(t_ns))
+
+    def object_centre(self, object_id: int, t_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._turned(self.poses.object_centre(object_id, t_ns))
+
+    def sensor(self, sensor: str, t_ns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self._turned(self.poses.sensor(sensor, t_ns))
+
+
+def test_turning_the_whole_world_changes_no_box_in_the_ego_frame() -> None:
+    truth = drive().truth
+    turned = replace(truth, poses=Turned(truth.poses, rotation_rpy(0.1, -0.2, 2.0)))
+
+    def boxes(of: Truth) -> list[list[float]]:
+        told = [m["markers"] for _, topic, _, m in truth_messages(of, 0, 0) if topic == "/truth/markers"]
+        poses = [cube["pose"] for markers in told for cube in markers]
+        return [[*p["position"].values(), *p["orientation"].values()] for p in poses]
+
+    one, other = np.array(boxes(truth)), np.array(boxes(turned))
+    signs = np.sign(np.einsum("ni,ni->n", one[:, 3:], other[:, 3:]))  # q and -q are the same rotation
+    assert other[:, :3] == pytest.approx(one[:, :3], abs=1e-9)
+    assert signs[:, None] * other[:, 3:] == pytest.approx(one[:, 3:], abs=1e-9)
 
 
 def test_the_reference_is_a_point_of_the_ego_frame(read: Read) -> None:
