@@ -64,7 +64,7 @@ def made() -> dict[str, Recording]:
     for system, scenario in (("car", "overtake-approach"), ("wearable", "overtake-wobble")):
         job = Job(
             scenario=scenario, system=system, seed=0, pipelines=(),
-            changes=(f"systems.{system}.duration_s=0.6",),
+            changes=(f"systems.{system}.duration_s=0.4",),
         )  # fmt: skip
         found[system] = recording_of(job)[2].recording
     return found
