@@ -37,7 +37,8 @@ def log(sweeps: int, shift_px: float = 0.0) -> Log:
         messages.append(
             LidarScan(
                 sensor="lidar", seq=seq, stamp_ns=at, arrival_ns=at,
-                xyz_m=np.array([[10.0, 0.0, 0.0]], np.float32), intensity=np.ones(1, np.float32), offset_ns=np.zeros(1, np.int32), ring=np.zeros(1, np.int16),
+                xyz_m=np.array([[10.0, 0.0, 0.0]], np.float32),
+                intensity=np.ones(1, np.float32), offset_ns=np.zeros(1, np.int32), ring=np.zeros(1, np.int16),
             )
         )  # fmt: skip
         box = (310.0 + shift_px, 230.0, 330.0 + shift_px, 250.0)
