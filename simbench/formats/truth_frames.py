@@ -145,20 +145,37 @@ def _read_reference(taken: Taken) -> GnssReference:
     return found
 
 
-SCAN = {"object_id": "i32", "part_id": "i32", "true_range_m": "f64", "fire_ns": "i64", "incidence_rad": "f32"}
-
-
 def _scan(scan: ScanTruth) -> Frame:
+    """Numbers as narrow as they fit: half of a recording is this. Firing times count from the first."""
+    first_ns = int(scan.fire_ns.min()) if len(scan.fire_ns) else 0
     return Frame(
-        kind="scan_truth", fields={"sensor": scan.sensor, "seq": int(scan.seq)},
-        arrays={name: getattr(scan, name) for name in SCAN},
+        kind="scan_truth",
+        fields={"sensor": scan.sensor, "seq": int(scan.seq), "first_fire_ns": first_ns},
+        arrays={
+            "object_id": _narrow(scan.object_id, np.int16), "part_id": _narrow(scan.part_id, np.int16),
+            "fire_offset_ns": _narrow(scan.fire_ns - first_ns, np.int32),
+            "true_range_m": scan.true_range_m, "incidence_rad": scan.incidence_rad,
+        },
     )  # fmt: skip
 
 
+def _narrow(values: np.ndarray, dtype: type[np.int16] | type[np.int32]) -> np.ndarray:
+    """FrameError: a value does not fit."""
+    limits = np.iinfo(dtype)
+    if len(values) and (values.min() < limits.min or values.max() > limits.max):
+        raise FrameError(f"a scan's truth has numbers beyond {limits.min} to {limits.max}")
+    return values.astype(dtype)
+
+
 def _read_scan(taken: Taken) -> ScanTruth:
+    first_ns = taken.integer("first_fire_ns")
     found = ScanTruth(
         sensor=taken.text("sensor"), seq=taken.integer("seq"),
-        **{name: taken.array(name, dtype, ("n",)) for name, dtype in SCAN.items()},
+        object_id=taken.array("object_id", "i16", ("n",)).astype(np.int32),
+        part_id=taken.array("part_id", "i16", ("n",)).astype(np.int32),
+        fire_ns=taken.array("fire_offset_ns", "i32", ("n",)) + np.int64(first_ns),
+        true_range_m=taken.array("true_range_m", "f64", ("n",)),
+        incidence_rad=taken.array("incidence_rad", "f32", ("n",)),
     )  # fmt: skip
     taken.end()
     return found
