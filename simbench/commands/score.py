@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 @click.argument("target", metavar="TARGET")
 @click.option(
     "--results", type=click.Path(path_type=Path), default=None, metavar="FILE",
-    help="JSON lines (simbench-outputs/1), or positions: .csv. Without it the messages are written.",
+    help="JSON lines (simbench-outputs/1), or positions: a .csv, or Detection3DArray messages in a .mcap or "
+         "a bag's folder. Without it the messages are written.",
 )  # fmt: skip
 @click.option("--system", type=click.Choice(["car", "wearable"]), default="car", show_default=True)
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True)

@@ -11,9 +11,11 @@ from simbench.drive import Driven
 from simbench.elsewhere.messages import messages_as_bytes
 from simbench.elsewhere.outputs import read_outputs
 from simbench.elsewhere.positions import score_positions
+from simbench.elsewhere.ros2 import read_detections3d
 from simbench.elsewhere.table import read_table
 from simbench.environment import environment
 from simbench.files import prepare_folder, write_bytes
+from simbench.formats.ros2.read import mcap_of
 from simbench.outcome import exit_code
 from simbench.result_file import Record, write_result
 from simbench.results import record_of
@@ -52,6 +54,10 @@ def _case(results: Path, made: Made) -> Case:
     if results.suffix.lower() == ".csv":
         scores = score_positions(made.recording, read_table(results), str(results))
         case = scored(results.name, scores, None)
+    elif results.suffix.lower() == ".mcap" or results.is_dir():
+        file = mcap_of(results)
+        scores = score_positions(made.recording, read_detections3d(file, made.recording), str(file))
+        case = scored(results.name or file.name, scores, None)
     else:
         outputs, trajectories = read_outputs(results, made.recording)
         driven = Driven(outputs=outputs, trajectories=trajectories, scan_ms=(), step_ns={})

@@ -77,18 +77,23 @@ def write_ros2(recording: Recording, path: Path) -> dict[str, int]:
     return _write(recording, path).counts
 
 
-def _write(recording: Recording, path: Path) -> Written:
-    messages = recording.messages
-    sensors = {*recording.calibration.T_ego_sensor, *(m.sensor for m in messages)}
-    names.check_sensors(sorted(sensors))
-    times = [t for m in messages for t in (m.stamp_ns, m.arrival_ns)]
+def epoch_of(recording: Recording) -> int:
+    """Seconds that a recording's bag adds to all times. BadInput: no ROS time can tell them."""
+    times = [t for m in recording.messages for t in (m.stamp_ns, m.arrival_ns)]
     times += instants_ns(recording.truth).tolist()
     if recording.truth.reference is not None:
         times += [
             *recording.truth.reference.fix_ns.tolist(),
             *recording.truth.reference.available_ns.tolist(),
         ]
-    epoch_s = names.epoch_s(times)
+    return names.epoch_s(times)
+
+
+def _write(recording: Recording, path: Path) -> Written:
+    messages = recording.messages
+    sensors = {*recording.calibration.T_ego_sensor, *(m.sensor for m in messages)}
+    names.check_sensors(sorted(sensors))
+    epoch_s = epoch_of(recording)
     start_ns = messages[0].arrival_ns if messages else 0
     outs = sorted(_outs(recording, start_ns, epoch_s * names.S_TO_NS), key=lambda out: out.log_ns)
     with writing(path) as file:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -73,12 +73,18 @@ def _box(told: Message) -> Box:
         raise MessageError(f"a box of {size_x:g} x {size_y:g} px at ({x:g}, {y:g})")
     if centre["theta"] != 0.0:
         raise MessageError(f"a box is turned by {centre['theta']:g} rad")
-    best = max((r["hypothesis"] for r in told["results"]), key=lambda h: _score(h["score"]), default=None)
+    best = likeliest(told["results"])
     corners = (x - 0.5 * size_x, y - 0.5 * size_y, x + 0.5 * size_x, y + 0.5 * size_y)
     return Box(
         class_id=None if best is None else best["class_id"], track=told["id"], box_px=corners,
         confidence=0.0 if best is None else best["score"],
     )  # fmt: skip
+
+
+def likeliest(results: Sequence[Message]) -> Message | None:
+    """The hypothesis of the highest score among a detection's results, the first of equals; None: there is
+    none."""
+    return max((one["hypothesis"] for one in results), key=lambda told: _score(told["score"]), default=None)
 
 
 def _score(score: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -118,7 +118,7 @@ def _item(
     found: Found, role: Role, number: int, topics: TopicMap, tree: FrameTree,
     known: dict[tuple[str, bytes], str | None],
 ) -> Item | None:  # fmt: skip
-    kind = _kind(found, role, known)
+    kind = kind_of(found, TYPES[role.kind], known)
     if found.log_ns >= 2**63:
         raise MessageError(f"its log time is {found.log_ns} ns")
     if len(found.data) > MOST_SMALL_BYTES and role.kind not in ("points", "image"):
@@ -139,14 +139,15 @@ def _item(
     )  # fmt: skip
 
 
-def _kind(found: Found, role: Role, known: dict[tuple[str, bytes], str | None]) -> str:
-    """The message's type. MessageError: it is not one for this role, or is defined in another way."""
+def kind_of(found: Found, allowed: Sequence[str], known: dict[tuple[str, bytes], str | None]) -> str:
+    """The message's type. known: what is wrong with the definitions that were met, for the next message.
+    MessageError: it is none of those allowed, or is defined in another way."""
     if found.channel.message_encoding != "cdr":
         raise MessageError(f"it is encoded as '{found.channel.message_encoding[:40]}', not as cdr")
     schema = found.schema
-    if schema is None or schema.name not in TYPES[role.kind]:
+    if schema is None or schema.name not in allowed:
         name = "nothing" if schema is None else schema.name[:80]
-        raise MessageError(f"it is {name}, not {' or '.join(TYPES[role.kind])}")
+        raise MessageError(f"it is {name}, not {' or '.join(allowed)}")
     if schema.encoding == "ros2msg":
         key = (schema.name, schema.data)
         if key not in known:
