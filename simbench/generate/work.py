@@ -105,13 +105,16 @@ def write_as(one: Format, recording: Recording, task: Task) -> int:
 
 @contextmanager
 def placed(place: Path) -> Iterator[Path]:
-    """An empty folder beside a place, put there when all is written; what was there is replaced."""
-    beside = place.parent / f".{place.name}"
-    shutil.rmtree(beside, ignore_errors=True)  # what a killed worker left
+    """An empty folder of a place's name beside it, put there when all is written; what was there is
+    replaced."""
+    aside = place.parent / f".{place.name}"
+    shutil.rmtree(aside, ignore_errors=True)  # what a killed worker left
+    beside = aside / place.name
     beside.mkdir(parents=True)
     yield beside
     shutil.rmtree(place, ignore_errors=True)  # made by other code, or the ledger would hold it
     beside.rename(place)
+    aside.rmdir()
 
 
 def source_of(job: Job) -> Source:

@@ -178,6 +178,9 @@ def test_other_formats_lie_beside_the_recording(tmp_path: Path) -> None:
     assert ask(tmp_path, seeds=(0,), formats=("mcap", "kitti", "pcd")) == 0
     for kind, suffix in (("mcap", ".mcap"), ("kitti", ".bin"), ("pcd", ".pcd")):
         assert list((tmp_path / kind / FIRST).rglob(f"*{suffix}")), kind
+    assert (tmp_path / "mcap" / FIRST / f"{FIRST}.mcap").is_file()
+    bag = (tmp_path / "mcap" / FIRST / "metadata.yaml").read_text(encoding="utf-8")
+    assert f"{FIRST}.mcap" in bag and f".{FIRST}" not in bag
     (row,) = rows(tmp_path)
     files = [path for path in tmp_path.rglob("*") if path.is_file() and FIRST in str(path)]
     assert row["size_bytes"] == sum(path.stat().st_size for path in files)
