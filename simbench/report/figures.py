@@ -16,6 +16,7 @@ from markupsafe import Markup
 
 from fusion.explain import AoiExplanation
 from simbench.case import JobResult
+from simbench.paper import TABLE_II
 from simbench.report import palette
 from simbench.report.choose import (
     ORACLE,
@@ -26,7 +27,6 @@ from simbench.report.choose import (
     pairs_of,
     value_of,
 )
-from simbench.report.paper import TABLE_II
 from simbench.report.words import percent, pipeline_words, signed_m
 from simbench.score.budget import PARTS
 from simbench.score.localization import Fix, FrameScore

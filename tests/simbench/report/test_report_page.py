@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from simbench.case import ORACLE, JobResult
+from simbench.paper import TABLE_II
 from simbench.report.choose import groups_of, mean_of_runs
 from simbench.report.figures import budget_means
 from simbench.report.page import write_report
-from simbench.report.paper import TABLE_II
 from simbench.report.tables import COLUMNS
 from tests.simbench.report.make import PIPELINES, SCENARIO, crashed, result, without_target
 
