@@ -18,11 +18,14 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 
 from scenarios.errors import BadInput, printable, show
+from simbench.formats.picture_size import picture_size
 
 MAX_TEXT_BYTES = 16_000_000
 MAX_POINTS_BYTES = 64_000_000  # a full sweep of 64 beams is 2 MB
 MAX_IMAGE_BYTES = 64_000_000
 MAX_IMAGE_PX = 8192  # along a side
+MAX_IMAGE_PIXELS = 40_000_000
+FARTHEST_M = 1e6
 POINT_BYTES = 16  # x, y, z, reflectance: four little-endian float32
 
 
@@ -150,6 +153,11 @@ class Folder:
                 f"{int((~whole).sum())} of {len(found)} points do",
                 file=self.name_of(part),
             )
+        if len(found) and np.abs(found[:, :3]).max() > FARTHEST_M:
+            first = int(np.flatnonzero((np.abs(found[:, :3]) > FARTHEST_M).any(axis=1))[0])
+            raise BadInput(
+                f"point {first} lies too far away", file=self.name_of(part), allowed=f"up to {FARTHEST_M:g} m"
+            )
         reflectance = found[:, 3]
         if len(found) and not (reflectance.min() >= 0.0 and reflectance.max() <= 1.0):
             first = int(np.flatnonzero((reflectance < 0.0) | (reflectance > 1.0))[0])
@@ -163,14 +171,19 @@ class Folder:
     def image(self, part: str) -> UInt8[np.ndarray, "h w 3"]:
         """An image file as RGB. BadInput: OpenCV cannot read it."""
         raw, name = self._bytes(part, MAX_IMAGE_BYTES), self.name_of(part)
+        unreadable = BadInput("not an image that can be read", file=name, allowed="PNG or JPEG")
         try:
-            bgr = cv2.imdecode(np.frombuffer(raw, dtype=np.uint8), cv2.IMREAD_COLOR) if raw else None
+            width, height = picture_size(raw)
+        except ValueError:
+            raise unreadable from None
+        if max(width, height) > MAX_IMAGE_PX or width * height > MAX_IMAGE_PIXELS:
+            raise BadInput(f"{width}x{height} pixels are too many", file=name)
+        try:
+            bgr = cv2.imdecode(np.frombuffer(raw, dtype=np.uint8), cv2.IMREAD_COLOR)
         except cv2.error:
-            bgr = None
+            raise unreadable from None
         if bgr is None:
-            raise BadInput("not an image that can be read", file=name, allowed="PNG or JPEG")
-        if max(bgr.shape[:2]) > MAX_IMAGE_PX:
-            raise BadInput(f"{bgr.shape[1]}x{bgr.shape[0]} pixels are too many", file=name)
+            raise unreadable
         return np.ascontiguousarray(bgr[..., ::-1])
 
     def _bytes(self, part: str, most: int) -> bytes:
