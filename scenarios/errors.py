@@ -9,10 +9,13 @@ from typing import TypeAlias
 FieldPath: TypeAlias = tuple[str | int, ...]
 
 LONGEST_VALUE = 48
+LONGEST_FIELD = 300
+LONGEST_SENTENCE = 2000
 
 
 class BadInput(ValueError):  # noqa: N818 (a sentence for the user, not a failure of the program)
-    """What the user wrote cannot be used. `str(error)` is one line; a command prints it and exits 2.
+    """What the user wrote cannot be used. `str(error)` is one line without control characters, whatever a
+    file said; a command prints it and exits 2.
 
     problem: what is wrong. file, line, field: where (each may be None). allowed: what would be right.
     hint: the nearest known word.
@@ -34,13 +37,15 @@ class BadInput(ValueError):  # noqa: N818 (a sentence for the user, not a failur
         self.field = field
         self.allowed = allowed
         self.hint = hint
-        place = [printable(file)] if file else []
+        place = [file] if file else []
         place += [f"line {line}"] if line else []
-        place += [printable(field)] if field else []
+        place += [field[:LONGEST_FIELD]] if field else []
         text = f"{', '.join(place)}: {problem}" if place else problem
         text += f" (allowed: {allowed})" if allowed else ""
         text += f"; did you mean '{hint}'?" if hint else "."
-        super().__init__(text)
+        if len(text) > LONGEST_SENTENCE:
+            text = text[:LONGEST_SENTENCE] + "..."
+        super().__init__(printable(text))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Keep all attributes when a worker process sends the error home."""

@@ -3,12 +3,40 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from io import BufferedWriter
+from io import BufferedReader, BufferedWriter
 from pathlib import Path
 
 from scenarios.errors import BadInput
+
+
+def open_plain(path: Path) -> BufferedReader:
+    """A file for reading. BadInput: there is none, it cannot be read, or it is a pipe or a device, which
+    might never answer, or never end."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.close(descriptor)
+            raise BadInput("is no plain file", file=str(path))
+        return os.fdopen(descriptor, "rb")
+    except FileNotFoundError:
+        raise BadInput("no such file", file=str(path)) from None
+    except OSError as error:
+        raise BadInput(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+
+
+def read_plain(path: Path, most_bytes: int) -> bytes:
+    """All of a file. BadInput as above, and where it is larger than allowed."""
+    with open_plain(path) as file:
+        try:
+            content = file.read(most_bytes + 1)
+        except OSError as error:
+            raise BadInput(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+    if len(content) > most_bytes:
+        raise BadInput(f"is larger than {most_bytes} bytes", file=str(path))
+    return content
 
 
 def prepare_folder(folder: Path) -> None:

@@ -22,6 +22,7 @@ __all__ = ["CutOff", "Entry", "LogWriter", "read_log"]
 
 CHUNK_BYTES = 2**20
 DIGEST_BYTES = 32
+MOST_GROWTH = 50  # times the file's size, unpacked: what `LogWriter` writes grows to two to ten times
 LIBRARY = "simbench"
 
 
@@ -105,12 +106,12 @@ def read_log(path: Path, *, encoding: str) -> Iterator[Entry]:
     early; what came before is whole."""
     name = str(path)
     counts: dict[str, int] = {}
-    for found in read_records(path, checked=True):
+    for found in read_records(path, checked=True, most_growth=MOST_GROWTH):
         if not isinstance(found, Found):
             continue
         entry = _entry(found, encoding, name)
         if entry.seq != counts.setdefault(entry.topic, 0):
-            missing = f"message {counts[entry.topic]} of {entry.topic} is missing"
+            missing = f"message {counts[entry.topic]} of {entry.topic[:80]} is missing"
             raise BadInput(f"is damaged: {missing}", file=name)
         counts[entry.topic] += 1
         yield entry
@@ -129,5 +130,5 @@ def _entry(found: Found, encoding: str, name: str) -> Entry:
         topic=channel.topic, log_ns=found.log_ns, publish_ns=found.publish_ns, seq=found.sequence, data=data
     )
     if entry.digest != digest:
-        raise BadInput(f"message {found.sequence} of {channel.topic} is not what was written", file=name)
+        raise BadInput(f"message {found.sequence} of {channel.topic[:80]} is not what was written", file=name)
     return entry

@@ -15,7 +15,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from scenarios.errors import BadInput, printable
+from scenarios.errors import BadInput
+from simbench.files import open_plain
 
 if TYPE_CHECKING:
     from mcap.records import Channel, Metadata, Schema
@@ -49,30 +50,31 @@ class Found:
 
 
 def read_records(
-    path: Path, *, checked: bool, most_chunk_bytes: int = MOST_CHUNK_BYTES
+    path: Path, *, checked: bool, most_chunk_bytes: int = MOST_CHUNK_BYTES, most_growth: int = MOST_GROWTH
 ) -> Iterator[Found | Metadata]:
     """All messages, and the metadata records between them, in the order of the file.
 
-    checked: every message must be covered by a checksum; else those that are there must be right. BadInput:
-    this is no such file, or it is damaged. CutOff: it ends too early; what came before is whole.
+    checked: every message must be covered by a checksum; else those that are there must be right.
+    most_growth: how many times its size the file may unpack to. BadInput: this is no such file, or it is
+    damaged. CutOff: it ends too early; what came before is whole.
     """
     from mcap.exceptions import McapError
 
     name = str(path)
     ended = False
     try:
-        with path.open("rb") as file:
+        with open_plain(path) as file:
             size = os.fstat(file.fileno()).st_size
             begin = file.read(len(MAGIC))
             if not MAGIC.startswith(begin):
                 raise BadInput("is no MCAP file", file=name)
             file.seek(0)
             bounded = _Bounded(file, size)
-            reading = _Reading(name=name, checked=checked, most=most_chunk_bytes, size=size)
+            reading = _Reading(
+                name=name, checked=checked, most=most_chunk_bytes, size=size, growth=most_growth
+            )
             yield from reading.records(bounded, size)
             ended = reading.ended
-    except FileNotFoundError:
-        raise BadInput("no such file", file=name) from None
     except _EndError:
         raise CutOff("is cut off: it ends before its end", file=name) from None
     except BadInput:
@@ -89,9 +91,9 @@ class _Reading:
     """What is known of a file of `size` bytes while it is read. bytes_left: that may still be unpacked;
     records_left: that may still be met in chunks."""
 
-    def __init__(self, *, name: str, checked: bool, most: int, size: int) -> None:
-        self.name, self.checked, self.most = name, checked, most
-        self.bytes_left = FREE_BYTES + MOST_GROWTH * size
+    def __init__(self, *, name: str, checked: bool, most: int, size: int, growth: int) -> None:
+        self.name, self.checked, self.most, self.growth = name, checked, most, growth
+        self.bytes_left = FREE_BYTES + growth * size
         self.records_left = FREE_RECORDS + size // BYTES_A_RECORD
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
@@ -101,7 +103,8 @@ class _Reading:
         from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
         from mcap.stream_reader import StreamReader
 
-        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=size)  # type: ignore[arg-type]
+        most = max(size, 2 * self.most)  # what is longer is no record; what only ends too late is cut off
+        reader = StreamReader(file, emit_chunks=True, validate_crcs=True, record_size_limit=most)  # type: ignore[arg-type]
         for record in reader.records:
             self.ended = self.ended or isinstance(record, Footer)
             if isinstance(record, Message):
@@ -162,10 +165,10 @@ class _Reading:
             raise BadInput(f"has a chunk of {size} bytes; {self.most} are allowed", file=self.name)
         self.bytes_left -= size
         if self.bytes_left < 0:
-            raise BadInput(f"unpacks to more than {MOST_GROWTH} times its size", file=self.name)
+            raise BadInput(f"unpacks to more than {self.growth} times its size", file=self.name)
         if chunk.compression not in COMPRESSIONS:
             raise BadInput(
-                f"has chunks compressed by '{printable(chunk.compression[:40])}'", file=self.name,
+                f"has chunks compressed by '{chunk.compression[:40]}'", file=self.name,
                 allowed=", ".join(word or "nothing" for word in COMPRESSIONS),
             )  # fmt: skip
         data = _decompressed(chunk.compression, chunk.data, size, self.name)

@@ -78,6 +78,8 @@ def pieces(frame: Frame) -> list[bytes | memoryview]:
 
 def sizes(head: bytes) -> tuple[int, int]:
     """Bytes of the header and of the body that follow a head of 12 bytes."""
+    if len(head) != HEAD.size:
+        raise FrameError(f"no frame has a head of {len(head)} bytes")
     magic, header, body = HEAD.unpack(head)
     if magic != MAGIC:
         raise FrameError(f"no frame begins with {bytes(head)!r}")
