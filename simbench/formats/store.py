@@ -10,7 +10,6 @@ that pictures are PNG).
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,20 +24,25 @@ from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
 from simbench.faults.receipt import Receipt
-from simbench.files import prepare_folder, write_text
-from simbench.formats.container import CutOff, Entry, LogWriter, read_log
-from simbench.formats.picture_frames import PICTURE, AsPng, picture_frame, read_picture
+from simbench.files import prepare_folder, read_plain, write_text
+from simbench.formats.container import LogWriter
+from simbench.formats.picture_frames import PICTURE, Album, AsPng, picture_frame
 from simbench.formats.png import encode
+from simbench.formats.sound import check_sound
+from simbench.formats.stored_frames import ENCODING, MANIFEST, Part, Word, frames_of
 from simbench.formats.truth_frames import read_truth, truth_frames
-from simbench.isolate.frames import HEAD, Frame, FrameError, pack, pieces, sizes, unpack
+from simbench.isolate.frames import Frame, FrameError, pack, pieces
 from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
 from simbench.recording import Recording
 
+__all__ = [
+    "MANIFEST", "MESSAGES", "NOTHING", "TRUTH", "Injected", "Manifest", "Part", "Source", "Stored",
+    "first_difference", "read_manifest", "read_recording", "write_recording",
+]  # fmt: skip
+
 SCHEMA = "simbench-recording/1"
-ENCODING = "simbench-frame/1"
-MANIFEST, MESSAGES, TRUTH = "recording.json", "messages.mcap", "truth.mcap"
+MESSAGES, TRUTH = "messages.mcap", "truth.mcap"
 LONGEST_MANIFEST = 1_000_000
-Word = Annotated[str, Field(max_length=4000)]
 
 
 def _receipt(value: object) -> object:
@@ -46,20 +50,12 @@ def _receipt(value: object) -> object:
     return TypeAdapter(Receipt).validate_python(value) if isinstance(value, dict) else value
 
 
-class Part(Spec):
-    """One of the two files. sha256: of the hashes of its messages, in their order."""
-
-    count: Annotated[int, Field(ge=0)]
-    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
-    topics: Mapping[Word, Annotated[int, Field(ge=1)]]
-
-
 class Source(Spec):
     """What was recorded, in the words of `simbench generate`."""
 
     scenario: Word
     system: Word
-    seed: Annotated[int, Field(ge=0)]
+    seed: Annotated[int, Field(ge=0, lt=2**63)]
     faults: tuple[Word, ...] = ()
     changes: tuple[Word, ...] = ()
     images: Literal["none", "raycast", "gl"] = "none"
@@ -129,44 +125,50 @@ def write_recording(
 
 def read_recording(folder: Path) -> Stored:
     """A recording from its folder. One that was cut off is read up to there, and `missing` says so. BadInput:
-    there is none, or what is there is damaged."""
+    there is none, what is there is damaged, or it cannot be (`sound.py`)."""
     manifest = read_manifest(folder)
     missing = [] if manifest.complete else ["recording.json: writing was not completed"]
-    messages, why = _read(folder / MESSAGES, manifest.messages)
-    missing += why
-    truth, why = _read(folder / TRUTH, manifest.truth)
-    missing += why
-    if not messages or messages[0].kind != "reset":
-        wrong = "is cut off before its calibration" if not messages else "does not begin with a calibration"
+    frames = frames_of(folder / MESSAGES, manifest.messages, missing)
+    first, pictures = next(frames, None), Album()
+    if first is None or first.kind != "reset":
+        wrong = "is cut off before its calibration" if first is None else "does not begin with a calibration"
         raise BadInput(wrong, file=str(folder / MESSAGES))
     try:
-        calibration, categories = read_reset(messages[0])
-        told = tuple(_message(frame) for frame in messages[1:])
+        calibration, categories = read_reset(first)
+        told = tuple(_message(frame, pictures) for frame in frames)
     except FrameError as error:
         raise BadInput(f"is malformed: {error}", file=str(folder / MESSAGES)) from None
+    before = len(missing)
     try:
-        really = read_truth(iter(truth))
+        really = read_truth(frames_of(folder / TRUTH, manifest.truth, missing))
     except FrameError as error:
+        if missing[before:]:
+            raise BadInput("is cut off before its poses", file=str(folder / TRUTH)) from None
         raise BadInput(f"is malformed: {error}", file=str(folder / TRUTH)) from None
     recording = Recording(calibration=calibration, categories=categories, messages=told, truth=really)
+    check_sound(
+        recording, whole=not missing, messages_file=str(folder / MESSAGES), truth_file=str(folder / TRUTH)
+    )
     return Stored(manifest=manifest, recording=recording, missing=tuple(missing))
 
 
 def read_manifest(folder: Path) -> Manifest:
     """What a folder's recording says of itself. BadInput: there is none, or it is malformed."""
     path = folder / MANIFEST
+    if not path.exists():
+        raise BadInput(f"holds no {MANIFEST}: no recording lies there", file=str(folder))
+    content = read_plain(path, LONGEST_MANIFEST)
     try:
-        if path.stat().st_size > LONGEST_MANIFEST:
-            raise BadInput(f"is larger than {LONGEST_MANIFEST} bytes", file=str(path))
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadInput(f"holds no {MANIFEST}: no recording lies there", file=str(folder)) from None
-    except (OSError, ValueError, RecursionError) as error:
+        data = json.loads(content.decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise BadInput(f"is no JSON that can be read: {error}", file=str(path)) from None
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         found = data.get("schema") if isinstance(data, dict) else None
         raise BadInput(f"is no recording: its schema is {str(found)[:60]!r}", file=str(path), allowed=SCHEMA)
-    return validate(Manifest, {k: v for k, v in data.items() if k != "schema"}, Where(file=str(path)))
+    found = validate(Manifest, {k: v for k, v in data.items() if k != "schema"}, Where(file=str(path)))
+    if found.complete and (found.messages is None or found.truth is None):
+        raise BadInput("says that it is complete, and holds no hash of its files", file=str(path))
+    return found
 
 
 def _write_manifest(manifest: Manifest, folder: Path) -> None:
@@ -186,8 +188,8 @@ def _messages(recording: Recording, as_png: AsPng = encode) -> Iterator[tuple[st
         yield f"/{message.sensor}/{frame.kind}", message.arrival_ns, message.stamp_ns, frame
 
 
-def _message(frame: Frame) -> Measurement:
-    return read_picture(frame) if frame.kind == PICTURE else read_message(frame)
+def _message(frame: Frame, pictures: Album) -> Measurement:
+    return pictures.read(frame) if frame.kind == PICTURE else read_message(frame)
 
 
 def _truth(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:
@@ -209,31 +211,6 @@ def _write(path: Path, frames: Iterator[tuple[str, int, int, Frame]]) -> Part:
 
 def _described(topic: str) -> tuple[str, str]:
     return f"simbench/{topic.rpartition('/')[2]}", "SHA-256 (32 bytes), then a frame: see docs/formats.md"
-
-
-def _read(path: Path, part: Part | None) -> tuple[list[Frame], list[str]]:
-    """All frames, and what is missing. BadInput: the file is damaged, or another than the manifest says."""
-    frames, total = list[Frame](), hashlib.sha256()
-    try:
-        for entry in read_log(path, encoding=ENCODING):
-            total.update(entry.digest)
-            frames.append(_frame(entry, path))
-    except CutOff:
-        of = "" if part is None else f" of {part.count}"
-        return frames, [f"{path.name}: it is cut off after {len(frames)}{of} messages"]
-    if part is not None and total.hexdigest() != part.sha256:
-        raise BadInput(f"is not the file that {MANIFEST} tells of: its hash is another", file=str(path))
-    return frames, []
-
-
-def _frame(entry: Entry, path: Path) -> Frame:
-    try:
-        header, body = sizes(entry.data[: HEAD.size])
-        if HEAD.size + header + body != len(entry.data):
-            raise FrameError(f"a frame of {HEAD.size + header + body} bytes stands in {len(entry.data)}")
-        return unpack(entry.data[HEAD.size : HEAD.size + header], entry.data[HEAD.size + header :])
-    except (FrameError, ValueError, OverflowError) as error:
-        raise BadInput(f"{entry.topic}, message {entry.seq}: {error}", file=str(path)) from None
 
 
 def first_difference(stored: Recording, again: Recording) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
@@ -73,7 +74,7 @@ def scene_of(manifest: Manifest, recording: Recording) -> RecordedScene:
     source, truth, part = manifest.source, recording.truth, manifest.messages
     scans = [m for m in recording.messages if isinstance(m, LidarScan)]
     return RecordedScene(
-        name=PurePath(source.scenario).stem,
+        name=_name(source.scenario),
         description=f"a recording of {source.scenario}, {source.system}, seed {source.seed}",
         rig=source.system,
         number=source.seed,
@@ -88,6 +89,12 @@ def scene_of(manifest: Manifest, recording: Recording) -> RecordedScene:
         ),
         sha256="" if part is None else part.sha256,
     )
+
+
+def _name(scenario: str) -> str:
+    """A scenario's name, or what is nearest to one of a file's."""
+    word = re.sub("[^a-z0-9_-]", "-", PurePath(scenario).stem.lower())[:60]
+    return word if word[:1].isalpha() else f"of-{word}"
 
 
 def _duration_s(recording: Recording) -> float:
