@@ -12,7 +12,8 @@ about this recording, is BadInput with file and line.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -20,16 +21,19 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fusion.messages import FusionOutput, LidarScan, LocalizedObject, Trajectory
-from scenarios.errors import BadInput, printable
+from scenarios.errors import BadInput
+from simbench.files import open_plain
 from simbench.recording import Recording
 from simbench.score.contract import ContractError, ScanKey, check_output, check_trajectories
 
 SCHEMA = "simbench-outputs/1"
 LARGEST_FILE = 2**30
+LONGEST_LINE = 2**24  # one sweep's objects with all their points, or one trajectory
 
 Int64 = Annotated[int, Field(ge=-(2**63), lt=2**63)]
 Name = Annotated[str, Field(max_length=200)]
-Point = tuple[float, float, float]
+Coordinate = Annotated[float, Field(ge=-1e7, le=1e7)]
+Point = tuple[Coordinate, Coordinate, Coordinate]
 Told = TypeVar("Told", bound="_Line")
 
 
@@ -44,9 +48,9 @@ class _Object(_Line):
     stamp_ns: Int64
     points: list[Int64]
     position_ego_m: Point
-    distance_m: float
-    azimuth_rad: float
-    confidence: float
+    distance_m: Coordinate
+    azimuth_rad: Coordinate
+    confidence: Annotated[float, Field(ge=0, le=1)]
 
 
 class _Output(_Line):
@@ -67,7 +71,7 @@ def read_outputs(path: Path, recording: Recording) -> tuple[tuple[FusionOutput, 
     """Outputs and trajectories of a file. BadInput as above."""
     scans = {(m.sensor, m.seq): m for m in recording.messages if isinstance(m, LidarScan)}
     outputs: dict[ScanKey, FusionOutput] = {}
-    tracks: list[Trajectory] = []
+    tracks: dict[int, Trajectory] = {}
     for number, text in _lines(path):
         line = _object(path, number, text)
         kind = next(iter(line)) if len(line) == 1 else None
@@ -76,38 +80,51 @@ def read_outputs(path: Path, recording: Recording) -> tuple[tuple[FusionOutput, 
                 output = _output(_told(_Output, line["output"]), scans, recording.truth.period_ns, outputs)
                 outputs[output.scan_sensor, output.scan_seq] = output
             elif kind == "trajectory":
-                tracks.append(_trajectory(_told(_Trajectory, line["trajectory"]), scans, recording))
-                check_trajectories(tracks)
+                track = _trajectory(_told(_Trajectory, line["trajectory"]), scans, recording)
+                check_trajectories([track])
+                if track.track_id in tracks:
+                    raise ContractError(f"Trajectory {track.track_id}: a track may have only one trajectory.")
+                tracks[track.track_id] = track
             else:
                 raise ContractError(f"a line must be one 'output' or one 'trajectory', not {text[:40]!r}.")
         except ContractError as error:
             raise BadInput(str(error).rstrip("."), file=str(path), line=number) from error
-    return tuple(outputs.values()), tuple(tracks)
+    return tuple(outputs.values()), tuple(tracks.values())
 
 
-def _lines(path: Path) -> list[tuple[int, str]]:
-    """The lines after the first, with their numbers."""
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"it is larger than {LARGEST_FILE >> 20} MB", file=str(path))
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise BadInput("it is no UTF-8 text", file=str(path)) from error
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror or error}", file=str(path)) from error
-    lines = [(number, line) for number, line in enumerate(text.split("\n"), 1) if line.strip()]
-    if not lines or _object(path, *lines[0]) != {"schema": SCHEMA}:
+def _lines(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines after the first, with their numbers, one by one."""
+    lines = ((number, line) for number, line in text_lines(path, LARGEST_FILE, LONGEST_LINE) if line.strip())
+    first = next(lines, None)
+    if first is None or _object(path, *first) != {"schema": SCHEMA}:
         raise BadInput(
             "the first line is no schema", file=str(path), line=1, allowed=f'{{"schema": "{SCHEMA}"}}'
         )
-    return lines[1:]
+    yield from lines
+
+
+def text_lines(path: Path, largest_file: int, longest_line: int) -> Iterator[tuple[int, str]]:
+    """Every line of a text file and its number from 1. BadInput: it is too long, or no UTF-8."""
+    name = str(path)
+    with open_plain(path) as file:
+        if os.fstat(file.fileno()).st_size > largest_file:
+            raise BadInput(f"it is larger than {largest_file >> 20} MB", file=name)
+        number = 0
+        while raw := file.readline(longest_line + 1):
+            number += 1
+            if len(raw) > longest_line:
+                raise BadInput(f"it is longer than {longest_line >> 10} kB", file=name, line=number)
+            try:
+                yield number, raw.decode("utf-8")
+            except UnicodeDecodeError:
+                raise BadInput("it is no UTF-8 text", file=name, line=number) from None
 
 
 def _object(path: Path, number: int, text: str) -> dict[str, Any]:
     try:
         found = json.loads(text)
     except (ValueError, RecursionError) as error:
-        why = printable(" ".join(str(error).split())[:100])
+        why = " ".join(str(error).split())[:100]
         raise BadInput(f"it is no JSON: {why}", file=str(path), line=number) from error
     if not isinstance(found, dict):
         raise BadInput("it is no JSON object", file=str(path), line=number)
@@ -117,9 +134,11 @@ def _object(path: Path, number: int, text: str) -> dict[str, Any]:
 def _told(model: type[Told], content: object) -> Told:
     try:
         return model.model_validate_json(json.dumps(content))
+    except RecursionError as error:
+        raise ContractError("it is nested too deeply.") from error
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
-        where = ".".join(map(str, first["loc"]))
+        where = ".".join(map(str, first["loc"]))[:200]
         message = first["msg"][:1].lower() + first["msg"][1:]
         raise ContractError(f"{where}: {message}." if where else f"{message}.") from error
 
@@ -132,9 +151,7 @@ def _output(
 ) -> FusionOutput:
     key = (told.scan_sensor, told.scan_seq)
     if key not in scans:
-        raise ContractError(
-            f"there is no scan {told.scan_seq} of '{printable(told.scan_sensor)}' in the recording."
-        )
+        raise ContractError(f"there is no scan {told.scan_seq} of '{told.scan_sensor}' in the recording.")
     scan = scans[key]
     if told.scan_stamp_ns != scan.stamp_ns:
         raise ContractError(

@@ -45,9 +45,9 @@ def score_positions(recording: Recording, positions: Sequence[Position], file: s
     """Scores of positions; mapping and error budget are null. BadInput: one lies in no sweep, or two of a
     track in one."""
     tracks = _tracks(recording, positions)
+    outputs = _outputs(recording, positions, tracks, file)  # every position lies in a sweep
     objects = _objects(recording, positions)
     known = {number: _object(objects[rows]) for number, rows in tracks.items()}
-    outputs = _outputs(recording, positions, tracks, file)
     try:
         trajectories = _trajectories(positions, tracks)
         check_trajectories(trajectories)
@@ -113,7 +113,7 @@ def _outputs(
             position = np.array(one.position_ego_m)
             origin = recording.calibration.T_ego_sensor[scans[at].sensor].translation_m
             here = found.setdefault((scans[at].sensor, scans[at].seq), [])
-            if any(other.track_id == number for other in here):
+            if here and here[-1].track_id == number:  # those of a track come one after the other
                 raise BadInput(f"{one.where}: track {one.track!r} has two positions in one sweep", file=file)
             here.append(
                 LocalizedObject(

@@ -10,22 +10,28 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from scenarios.errors import BadInput, Where, show
+from simbench.elsewhere.outputs import text_lines
 from simbench.elsewhere.positions import Position
 
 NEEDED = ("stamp_ns", "x_m", "y_m", "z_m")
 ALLOWED = (*NEEDED, "track", "category", "confidence")
 LARGEST_FILE = 2**28
+LONGEST_LINE = 2**16
+MOST_POSITIONS = 1_000_000
+FARTHEST_M = 1e7
+LATEST_NS = 2**62
 LONGEST_NAME = 200
 
 
 def read_table(path: Path) -> tuple[Position, ...]:
     """The positions of a file. BadInput with file and line: it is malformed."""
     rows = _rows(path)
-    header = rows[0][1] if rows else []
+    _, header = next(rows, (1, []))
     where = Where(file=str(path))
     for column in header:
         if column not in ALLOWED:
@@ -35,35 +41,36 @@ def read_table(path: Path) -> tuple[Position, ...]:
             raise BadInput(f"there is no column {column}", file=str(path), line=1, allowed=",".join(ALLOWED))
     if len(set(header)) < len(header):
         raise BadInput("a column stands twice", file=str(path), line=1)
-    found = []
-    for line, row in rows[1:]:
+    found: list[Position] = []
+    for line, row in rows:
+        if len(found) == MOST_POSITIONS:
+            raise BadInput(f"there are more than {MOST_POSITIONS} positions", file=str(path), line=line)
         if len(row) != len(header):
             raise BadInput(f"{len(row)} values under {len(header)} columns", file=str(path), line=line)
         found.append(_position(dict(zip(header, row, strict=True)), str(path), line))
     return tuple(found)
 
 
-def _rows(path: Path) -> list[tuple[int, list[str]]]:
-    """Every row that is not empty, with the line that it ends in."""
+def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
+    """Every row that is not empty, with the line that it ends in, one by one."""
+    reader = csv.reader((line for _, line in text_lines(path, LARGEST_FILE, LONGEST_LINE)), strict=True)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise BadInput(f"it is larger than {LARGEST_FILE >> 20} MB", file=str(path))
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.reader(file, strict=True)
-            return [(reader.line_num, row) for row in reader if row]
-    except UnicodeDecodeError:
-        raise BadInput("it is no UTF-8 text", file=str(path)) from None
+        for row in reader:
+            if row:
+                yield reader.line_num, row
     except csv.Error as error:
-        raise BadInput(f"it is no CSV: {error}", file=str(path)) from None
-    except OSError as error:
-        raise BadInput(f"cannot be read: {error.strerror or error}", file=str(path)) from None
+        raise BadInput(f"it is no CSV: {error}", file=str(path), line=reader.line_num) from None
 
 
 def _position(row: Mapping[str, str], file: str, line: int) -> Position:
     stamp = row["stamp_ns"].strip()
-    if not stamp.lstrip("-").isdecimal() or len(stamp) > 19:
+    if re.fullmatch("-?[0-9]{1,19}", stamp) is None or abs(int(stamp)) >= LATEST_NS:
         raise BadInput(f"{show(stamp)} is no whole number", file=file, line=line, field="stamp_ns")
     x, y, z = (_number(row[name], file, line, name) for name in ("x_m", "y_m", "z_m"))
+    if max(abs(x), abs(y), abs(z)) > FARTHEST_M:
+        raise BadInput(
+            "a position lies too far away", file=file, line=line, allowed=f"up to {FARTHEST_M:g} m"
+        )
     sure = _number(row["confidence"], file, line, "confidence") if row.get("confidence") else 1.0
     if not 0.0 <= sure <= 1.0:
         raise BadInput(f"is {sure:g}", file=file, line=line, field="confidence", allowed="0 to 1")

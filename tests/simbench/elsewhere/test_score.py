@@ -212,5 +212,5 @@ def test_a_file_that_is_no_json_is_one_sentence(tmp_path: Path, content: bytes, 
 
 
 def test_a_file_that_is_not_there_is_one_sentence(tmp_path: Path) -> None:
-    for path, sentence in ((tmp_path / "none", "cannot be read: "), (tmp_path, "holds 0 MCAP files")):
-        refused(score("--results", str(path), "--out", str(tmp_path / "out")), sentence, str(path))
+    for path, says in ((tmp_path / "none", "no such file"), (tmp_path, "holds 0 MCAP files")):
+        refused(score("--results", str(path), "--out", str(tmp_path / "out")), says, str(path))
