@@ -31,7 +31,8 @@ def read_plain(path: Path, most_bytes: int) -> bytes:
     """All of a file. BadInput as above, and where it is larger than allowed."""
     with open_plain(path) as file:
         try:
-            content = file.read(most_bytes + 1)
+            size = os.fstat(file.fileno()).st_size  # `read` makes room for all that it is asked for
+            content = file.read(min(size, most_bytes + 1))
         except OSError as error:
             raise BadInput(f"cannot be read: {error.strerror or error}", file=str(path)) from None
     if len(content) > most_bytes:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
@@ -190,7 +191,7 @@ class Folder:
         path, name = self._file(part), self.name_of(part)
         try:
             with path.open("rb") as file:
-                raw = file.read(most + 1)
+                raw = file.read(min(os.fstat(file.fileno()).st_size, most + 1))
         except OSError as error:
             raise BadInput(f"cannot be read: {_reason(error)}", file=name) from None
         if len(raw) > most:

@@ -10,6 +10,7 @@ came from an enemy: nothing is believed that the file's size does not bear out.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -150,7 +151,8 @@ def _read(path: Path, wanted: np.dtype[np.void]) -> Shaped[np.ndarray, " n"]:
         if not path.is_file():
             raise BadInput("not a file" if path.exists() else "no such file", file=name)
         with path.open("rb") as file:
-            raw = file.read(MOST_HEADER_BYTES + MOST_BYTES + 1)
+            size = os.fstat(file.fileno()).st_size  # `read` makes room for all that it is asked for
+            raw = file.read(min(size, MOST_HEADER_BYTES + MOST_BYTES + 1))
     except (OSError, ValueError) as error:
         if isinstance(error, BadInput):
             raise

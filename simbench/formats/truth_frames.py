@@ -11,12 +11,11 @@ import numpy as np
 from fusion.geometry import Transform
 from fusion.messages import BoxPx
 from simbench.formats.sampled import SampledPoses, Samples, sampled
-from simbench.isolate.fields import Taken
+from simbench.isolate.fields import MOST_NAMES, Taken
 from simbench.isolate.frames import Frame, FrameError
-from simbench.isolate.told import MOST_BOXES, read_reset, reset_frame
+from simbench.isolate.told import read_reset, reset_frame
 from simbench.truth import GnssReference, ImageTruth, ObjectInfo, ScanTruth, TrueBox, Truth
 
-MOST_OBJECTS = 10_000
 REFERENCE = ("position_ego_m", "centre_ego_m", "lever_m", "heading_m", "noise_m")
 
 
@@ -41,7 +40,13 @@ def read_truth(frames: Iterator[Frame]) -> Truth:
     one: dict[str, Any] = {}
     bodies: dict[str, Samples] = {}
     scans, images = list[ScanTruth](), list[ImageTruth]()
+    told: set[str] = set()
     for frame in frames:
+        what = f"poses of {frame.fields.get('body')}" if frame.kind == "poses" else frame.kind
+        if what in told:
+            raise FrameError(f"there are two '{what[:60]}'")
+        if frame.kind not in ("scan_truth", "image_truth"):
+            told.add(what)
         match frame.kind:
             case "truth_about":
                 one |= _read_about(Taken(frame))
@@ -97,8 +102,6 @@ def _read_about(taken: Taken) -> dict[str, Any]:
     if target is not None and (type(target) is not int or abs(target) >= 2**31):
         raise taken.error("'target_id' is neither a number nor null")
     names, categories = taken.texts("name", "n"), taken.texts("category", "n")
-    if len(names) > MOST_OBJECTS:
-        raise taken.error(f"it has {len(names)} objects; {MOST_OBJECTS} are allowed")
     ids = taken.array("object_id", "i32", ("n",)).tolist()
     sizes = taken.array("size_m", "f64", ("n", 3)).tolist()
     targets = tuple(taken.array("targets", "i32", ("t",)).tolist())
@@ -210,8 +213,8 @@ def _read_image(taken: Taken) -> ImageTruth:
     sensor, seq, capture_ns = taken.text("sensor"), taken.integer("seq"), taken.integer("capture_ns")
     rotation, translation = taken.array("rotation", "f64", (3, 3)), taken.array("translation_m", "f64", (3,))
     ids = taken.array("object_id", "i32", ("b",)).tolist()
-    if len(ids) > MOST_BOXES:
-        raise taken.error(f"it has {len(ids)} boxes; {MOST_BOXES} are allowed")
+    if len(ids) > MOST_NAMES:
+        raise taken.error(f"it has {len(ids)} boxes; {MOST_NAMES} are allowed")
     amodal = taken.array("amodal_px", "f64", ("b", 4)).tolist()
     visible = taken.array("visible_px", "f64", ("b", 4))
     share = taken.array("visible_fraction", "f64", ("b",)).tolist()

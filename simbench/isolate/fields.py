@@ -10,6 +10,7 @@ from simbench.isolate.frames import DTYPES, Frame, FrameError
 
 Shape = tuple[int | str, ...]
 LONGEST_NAME = 200
+MOST_NAMES = 10_000  # of the boxes of an image, or the objects of a scene
 
 
 class Taken:
@@ -36,6 +37,8 @@ class Taken:
         value = self._field(name)
         if not isinstance(value, list):
             raise self.error(f"'{name}' is no list")
+        if len(value) > MOST_NAMES:
+            raise self.error(f"'{name}' has {len(value)} entries; {MOST_NAMES} are allowed")
         self._count(name, count, len(value))
         return tuple(self._name(name, item) for item in value)
 
