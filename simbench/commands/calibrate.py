@@ -37,7 +37,7 @@ def calibrate(
     Prints, against the truth: reprojection error, extrinsic error, and the TPR of a static board by pair (the
     paper's Table I) and inside and outside the calibrated zone.
 
-    Example: simbench calibrate car-six-cameras --out out/calibration.yaml
+    Example: simbench calibrate car-six-cameras --cameras cam-front --out out/calibration.yaml
     """
     from simbench.calibration.file import write_calibration
     from simbench.calibration.study import PairStudy, Settings, calibrate_rig

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-import struct
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import UInt8
+
+from simbench.formats.picture_size import picture_size
 
 if TYPE_CHECKING:
     from simbench.motion import Motion
@@ -43,7 +44,9 @@ def decode(png: bytes) -> Picture:
     """The picture of a PNG. ValueError: it is none, or too large to be opened."""
     import cv2
 
-    width, height = size_px(png)
+    if not png.startswith(SIGNATURE):
+        raise ValueError("no PNG")
+    width, height = picture_size(png)
     if width * height > MOST_PIXELS:
         raise ValueError(f"a picture of {width} x {height} pixels; {MOST_PIXELS} are allowed")
     try:
@@ -53,14 +56,6 @@ def decode(png: bytes) -> Picture:
     if bgr is None or bgr.shape != (height, width, 3):
         raise ValueError("a PNG that cannot be decoded")
     return cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
-
-
-def size_px(png: bytes) -> tuple[int, int]:
-    """Width and height that a PNG claims. ValueError: it is no PNG."""
-    if len(png) < 24 or png[:8] != SIGNATURE or png[12:16] != b"IHDR":
-        raise ValueError("no PNG")
-    width, height = struct.unpack(">II", png[16:24])
-    return width, height
 
 
 class Pictures:

@@ -191,7 +191,7 @@ def _row(found: Case, metric: str) -> float:
     return value
 
 
-@pytest.mark.parametrize(("system", "seed"), [("car", 0), ("car", 1), ("wearable", 0)])
+@pytest.mark.parametrize(("system", "seed"), [("car", 0), ("wearable", 0)])
 def test_an_offset_of_100_ms_alone_moves_tpr_by_less_than_5_percent(system: str, seed: int) -> None:
     """The paper's error by itself hardly hurts the mapping.
 

@@ -239,8 +239,8 @@ CORPUS: dict[str, Hostile] = {
     ),
     "point-on-no-object": bad(numbers("scan_truth", "object_id", set(0, 77)), "object that is none"),
     "true-range-nan": bad(numbers("scan_truth", "true_range_m", set(0, np.nan)), "true range"),
-    "fired-at-the-end-of-time": bad(numbers("scan_truth", "fire_ns", set(0, LATE)), ""),
-    "fired-before-all-time": bad(numbers("scan_truth", "fire_ns", set(0, -(2**63))), ""),
+    "fired-at-the-end-of-time": bad(field("scan_truth", "first_fire_ns", LATE), ""),
+    "fired-before-all-time": bad(field("scan_truth", "first_fire_ns", -(2**63)), ""),
     "image-taken-at-the-end-of-time": bad(field("image_truth", "capture_ns", LATE), ""),
     "image-truth-of-a-lidar": bad(field("image_truth", "sensor", "lidar"), ""),
     "detection-of-no-object": bad(

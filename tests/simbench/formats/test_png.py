@@ -17,7 +17,8 @@ from hypothesis.extra.numpy import arrays
 
 from fusion.messages import CameraImage
 from simbench.case import Job
-from simbench.formats.png import Pictures, decode, encode, size_px
+from simbench.formats.picture_size import picture_size
+from simbench.formats.png import Pictures, decode, encode
 from simbench.formats.store import Source, read_recording, write_recording
 from simbench.run import recording_of
 
@@ -31,7 +32,7 @@ PICTURES = st.tuples(st.integers(1, 9), st.integers(1, 9)).flatmap(
 def test_a_picture_comes_back_bit_by_bit(rgb: np.ndarray, grey: bool) -> None:
     rgb = np.repeat(rgb[..., :1], 3, axis=2) if grey else rgb
     assert np.array_equal(decode(encode(rgb)), rgb)
-    assert size_px(encode(rgb)) == (rgb.shape[1], rgb.shape[0])
+    assert picture_size(encode(rgb)) == (rgb.shape[1], rgb.shape[0])
 
 
 def test_another_decoder_sees_the_same_colours() -> None:

@@ -13,13 +13,13 @@ from scipy.spatial.transform import Rotation
 
 from fusion.geometry import Transform, rotation_exp
 from scenarios.errors import BadInput
+from simbench.formats.picture_size import picture_size
 from simbench.formats.ros2 import definitions as ros
 from simbench.formats.ros2 import names
 from simbench.formats.ros2.cdr import MessageError, decode, encode
 from simbench.formats.ros2.decode import camera
 from simbench.formats.ros2.encode import camera_info, transform
 from simbench.formats.ros2.frames import FrameTree
-from simbench.formats.ros2.pictures import _size
 from simbench.formats.ros2.rotation import matrix_of, quaternions_of
 from tests.simbench.formats.ros2_foreign import message, typestore
 
@@ -194,7 +194,7 @@ def test_the_size_of_an_image_is_known_before_it_is_unpacked(
     pixels = np.zeros((height, width) if grey else (height, width, 3), dtype=np.uint8)
     for extension, options in ((".png", []), (".jpg", [cv2.IMWRITE_JPEG_QUALITY, quality]),
                                (".jpg", [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])):  # fmt: skip
-        assert _size(cv2.imencode(extension, pixels, options)[1].tobytes()) == (width, height)
+        assert picture_size(cv2.imencode(extension, pixels, options)[1].tobytes()) == (width, height)
 
 
 @given(st.integers(-(10**18), 2 * 10**18), st.integers(0, 10**9))
