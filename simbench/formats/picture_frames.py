@@ -8,7 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from fusion.messages import CameraImage
-from simbench.formats.png import Picture, decode, size_px
+from simbench.formats.picture_size import picture_size
+from simbench.formats.png import Picture, decode
 from simbench.isolate.fields import Taken
 from simbench.isolate.frames import Frame, FrameError
 
@@ -52,7 +53,7 @@ class Album:
         png = frame.arrays.get("png")
         if png is not None:
             try:
-                width, height = size_px(png[:24].tobytes())
+                width, height = picture_size(png[:24].tobytes())
             except ValueError as error:
                 raise FrameError(f"a '{frame.kind}' is malformed: {error}") from error
             self._left += MOST_GROWTH * png.nbytes - 3 * width * height

@@ -184,7 +184,7 @@ CORPUS: dict[str, Hostile] = {
     "speed-nan": bad(numbers("ego_motion", "velocity_mps", set(0, np.nan)), "velocity_mps"),
     "picture-of-2-to-the-62-px": bad(numbers("camera_png", "png", claims), "times their size"),
     "picture-bomb": bad(png(png_bomb), "times their size"),
-    "picture-that-is-none": bad(png(lambda: b"GIF89a" * 20), "no PNG"),
+    "picture-that-is-none": bad(png(lambda: b"GIF89a" * 20), "neither PNG nor JPEG"),
     "picture-of-another-size": bad(
         png(lambda: noise(16, 8)), "16 x 8 pixels, its camera has 48 x 32"
     ),
