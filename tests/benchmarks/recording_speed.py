@@ -40,7 +40,7 @@ def timed(work: Callable[[], object]) -> float:
 
 
 def arrays(recording: Recording) -> dict[str, np.ndarray]:
-    found = {}
+    found: dict[str, np.ndarray] = {}
     for frames in (_messages(recording), _truth(recording)):
         for number, (topic, _, _, frame) in enumerate(frames):
             found |= {f"{topic}/{number}/{name}": array for name, array in frame.arrays.items()}
@@ -61,8 +61,8 @@ def main() -> None:
             writing = timed(lambda: write_recording(recording, out / "ours", source_of(job)))  # noqa: B023
             counting = timed(lambda: sights(recording))  # noqa: B023
             plain = arrays(recording)
-            saving = timed(lambda: np.savez(out / "plain.npz", **plain))  # noqa: B023
-            packing = timed(lambda: np.savez_compressed(out / "packed.npz", **plain))  # noqa: B023
+            saving = timed(lambda: np.savez(out / "plain.npz", **plain))  # type: ignore[arg-type]  # noqa: B023
+            packing = timed(lambda: np.savez_compressed(out / "packed.npz", **plain))  # type: ignore[arg-type]  # noqa: B023
             sizes = [size_of(out / "ours"), *((out / f"{n}.npz").stat().st_size for n in ("plain", "packed"))]
         rows.append((making, writing, counting, saving, packing, *sizes))
     making, writing, counting, saving, packing, ours, theirs, packed = (
