@@ -88,7 +88,8 @@ class Transform:
                 f"a transform needs a [3 3] rotation and a [3] translation, got "
                 f"{rotation.shape} and {translation_m.shape}"
             )
-        skewness = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+        with np.errstate(over="ignore", invalid="ignore"):  # then it is no rotation
+            skewness = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
         if not (skewness <= 1e-6 and np.linalg.det(rotation) > 0.0):  # True for NaN
             raise ValueError("rotation is not orthonormal with determinant +1")
         if not np.isfinite(translation_m).all():

@@ -17,6 +17,7 @@ from simbench.truth import PoseSource
 STEP_NS = 1_000_000
 BEYOND_NS = 200_000_000  # before the first and after the last time that anything is known of
 EGO = "ego"
+Span = tuple[int, int]  # first and last
 Poses = tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]
 
 
@@ -63,14 +64,20 @@ class SampledPoses:
 
 
 def sampled(
-    poses: PoseSource, object_ids: Iterable[int], sensors: Iterable[str], first_ns: int, last_ns: int
+    poses: PoseSource, object_ids: Iterable[int], sensors: Iterable[str], true_ns: Span, asked_ns: Span
 ) -> dict[str, Samples]:
-    """Everything from before the first to after the last time. What stands still has two samples."""
-    t_ns = np.arange(first_ns - BEYOND_NS, last_ns + BEYOND_NS + STEP_NS, STEP_NS, dtype=np.int64)
-    found = {EGO: poses.ego(t_ns)}
-    found |= {object_name(i): poses.object_centre(i, t_ns) for i in object_ids}
-    found |= {sensor_name(name): poses.sensor(name, t_ns) for name in sensors}
-    return {name: _kept(t_ns, *pose) for name, pose in found.items()}
+    """Everything from before the first to after the last time. What stands still has two samples. true_ns:
+    when something was measured; asked_ns: also what stamps claim: there scores ask for ego and objects."""
+    t_ns, t_asked_ns = _steps(true_ns), _steps(asked_ns)
+    found = {EGO: _kept(t_asked_ns, *poses.ego(t_asked_ns))}
+    found |= {object_name(i): _kept(t_asked_ns, *poses.object_centre(i, t_asked_ns)) for i in object_ids}
+    return found | {sensor_name(name): _kept(t_ns, *poses.sensor(name, t_ns)) for name in sensors}
+
+
+def _steps(span_ns: Span) -> Int64[np.ndarray, " k"]:
+    return np.arange(
+        span_ns[0] - BEYOND_NS, span_ns[1] + BEYOND_NS + STEP_NS, STEP_NS, dtype=np.int64
+    )  # fmt: skip
 
 
 def object_name(object_id: int) -> str:

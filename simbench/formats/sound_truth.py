@@ -19,6 +19,7 @@ LONGEST_PERIOD_NS = 3_600 * 10**9
 LEAST_ORTHONORMAL = 1e-6
 CATEGORY = re.compile("[a-z][a-z0-9_-]{0,63}")
 NOTHING = -1
+MARGIN_NS = 5_000_000  # of speeds, which are differences
 
 
 def faults_of_truth(truth: Truth, *, whole: bool) -> Iterator[str]:
@@ -62,12 +63,24 @@ def faults_of_match(recording: Recording, *, whole: bool) -> Iterator[str]:
                     yield f"sweep {where}: its truth has another number of points"
                 if whole and key not in scans:
                     yield f"sweep {where} has no truth"
+                if whole and not _reached(message, recording.truth):
+                    yield f"sweep {where}: its stamp lies where no poses are known"
             case CameraImage() | Detections():
                 if whole and key not in images:
                     yield f"image {where} has no truth"
                 if isinstance(message, Detections) and key in images:
                     if len(images[key].detection_object_id) != len(message.boxes):
                         yield f"image {where}: its truth has another number of detections"
+
+
+def _reached(scan: LidarScan, truth: Truth) -> bool:
+    """Whether ego and objects are known throughout what a sweep's stamp claims: scores ask for them there."""
+    assert isinstance(truth.poses, SampledPoses)
+    names = (EGO, *(object_name(info.object_id) for info in truth.objects))
+    first_ns = max(int(truth.poses.bodies[name].t_ns[0]) for name in names)
+    last_ns = min(int(truth.poses.bodies[name].t_ns[-1]) for name in names)
+    end_ns = scan.stamp_ns + max(int(scan.offset_ns.max(initial=0)), truth.period_ns)
+    return first_ns + MARGIN_NS <= scan.stamp_ns and end_ns + MARGIN_NS <= last_ns
 
 
 def _faults_of_objects(objects: tuple[ObjectInfo, ...]) -> Iterator[str]:

@@ -19,7 +19,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from fusion.messages import CameraImage, Measurement
+from fusion.messages import CameraImage, LidarScan, Measurement
 from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
@@ -193,7 +193,9 @@ def _message(frame: Frame, pictures: Album) -> Measurement:
 
 
 def _truth(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:
-    for topic, t_ns, frame in truth_frames(recording.truth):
+    stamps = [m.stamp_ns for m in recording.messages if isinstance(m, LidarScan)]
+    claimed = (min(stamps), max(stamps) + recording.truth.period_ns) if stamps else ()
+    for topic, t_ns, frame in truth_frames(recording.truth, claimed):
         yield topic, t_ns, t_ns, frame
 
 

@@ -3,7 +3,7 @@ are samples (`sampled.py`)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -19,13 +19,16 @@ from simbench.truth import GnssReference, ImageTruth, ObjectInfo, ScanTruth, Tru
 REFERENCE = ("position_ego_m", "centre_ego_m", "lever_m", "heading_m", "noise_m")
 
 
-def truth_frames(truth: Truth) -> Iterator[tuple[str, int, Frame]]:
-    """Topic, time [ns] and frame. First what does not belong to a message, then per scan and image."""
+def truth_frames(truth: Truth, claimed_ns: Sequence[int] = ()) -> Iterator[tuple[str, int, Frame]]:
+    """Topic, time [ns] and frame. First what does not belong to a message, then per scan and image.
+    claimed_ns: times of sweeps that their stamps claim; a clock that is off may claim any."""
     first_ns, last_ns = _span(truth)
+    asked_ns = (min((first_ns, *claimed_ns)), max((last_ns, *claimed_ns)))
     yield "/truth/about", first_ns, _about(truth)
     yield "/truth/calibration", first_ns, reset_frame(truth.calibration, {})
     ids = [info.object_id for info in truth.objects]
-    for body, samples in sampled(truth.poses, ids, truth.calibration.T_ego_sensor, first_ns, last_ns).items():
+    sensors = truth.calibration.T_ego_sensor
+    for body, samples in sampled(truth.poses, ids, sensors, (first_ns, last_ns), asked_ns).items():
         yield "/truth/poses", first_ns, _poses(body, samples)
     if truth.reference is not None:
         yield "/truth/reference", first_ns, _reference(truth.reference)
@@ -98,7 +101,7 @@ def _about(truth: Truth) -> Frame:
 
 
 def _read_about(taken: Taken) -> dict[str, Any]:
-    target = taken.optional("target_id", None)
+    target = taken.optional("target_id", False)
     if target is not None and (type(target) is not int or abs(target) >= 2**31):
         raise taken.error("'target_id' is neither a number nor null")
     names, categories = taken.texts("name", "n"), taken.texts("category", "n")
@@ -174,12 +177,14 @@ def _narrow(values: np.ndarray, dtype: type[np.int16] | type[np.int32]) -> np.nd
 
 
 def _read_scan(taken: Taken) -> ScanTruth:
-    first_ns = taken.integer("first_fire_ns")
+    first_ns, offset_ns = taken.integer("first_fire_ns"), taken.array("fire_offset_ns", "i32", ("n",))
+    if offset_ns.min() != 0 if len(offset_ns) else first_ns != 0:
+        raise taken.error("'fire_offset_ns' does not count from the first firing")
     found = ScanTruth(
         sensor=taken.text("sensor"), seq=taken.integer("seq"),
         object_id=taken.array("object_id", "i16", ("n",)).astype(np.int32),
         part_id=taken.array("part_id", "i16", ("n",)).astype(np.int32),
-        fire_ns=taken.array("fire_offset_ns", "i32", ("n",)) + np.int64(first_ns),
+        fire_ns=offset_ns + np.int64(first_ns),
         true_range_m=taken.array("true_range_m", "f64", ("n",)),
         incidence_rad=taken.array("incidence_rad", "f32", ("n",)),
     )  # fmt: skip
@@ -228,7 +233,7 @@ def _read_image(taken: Taken) -> ImageTruth:
         TrueBox(
             object_id=i,
             amodal_px=cast(BoxPx, tuple(outline)),
-            visible_px=None if np.isnan(seen).any() else cast(BoxPx, tuple(seen.tolist())),
+            visible_px=None if np.isnan(seen).all() else cast(BoxPx, tuple(seen.tolist())),
             visible_fraction=part,
         )
         for i, outline, seen, part in zip(ids, amodal, visible, share, strict=True)

@@ -160,9 +160,13 @@ def twice_posed(found: list[parts.Message]) -> list[parts.Message]:
     return [*found[:at], found[at], *found[at:]]
 
 
+def untargeted(header: dict[str, Any], body: bytes) -> tuple[dict[str, Any], bytes]:
+    return {name: value for name, value in header.items() if name != "target_id"}, body
+
+
 def unhashed(folder: Path) -> Path:
     """A changed sweep with a right CRC and hash of its own, of which the manifest knows nothing."""
-    numbers("lidar_scan", "xyz_m", set((0, 0), 3.0))(folder)
+    numbers("lidar_scan", "xyz_m", put((0, 0), 3.0))(folder)
     shutil.copy(parts.good_folder() / MANIFEST, folder / MANIFEST)
     return folder
 
@@ -188,7 +192,7 @@ def unknown_channel() -> bytes:
     return parts.mcap(parts.chunk(message, len(message), zlib.crc32(message), b""))
 
 
-def set(at: object, value: float) -> Callable[[np.ndarray], None]:
+def put(at: object, value: float) -> Callable[[np.ndarray], None]:
     def change(array: np.ndarray) -> None:
         array[at] = value
 

@@ -16,15 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from fusion.messages import CameraImage, Detection, Detections, EgoMotion, Measurement
+from fusion.messages import CameraImage, Detection, Detections, EgoMotion, LidarScan, Measurement
+from simbench.faults.delivery import Sweep
 from simbench.formats.container import LogWriter, read_log
 from simbench.formats.store import MANIFEST, MESSAGES, TRUTH, Source, write_recording
 from simbench.formats.stored_frames import ENCODING
 from simbench.isolate.frames import DTYPES, HEAD, MAGIC
 from simbench.recording import Recording
+from simbench.truth import ScanTruth
 from tests.simbench.support import recorded, staged
 
-SIZE_PX = (48, 32)
+SIZE_PX, COLUMNS = (384, 256), 1800
 SENSORS = ("lidar", "cam-front", "cam-front-left")
 ESCAPE = "\x1b]0;owned\x07\x1b[2J\n\rcam"
 SOURCE = Source(scenario="overtake-approach", system="car", seed=0, images="raycast")
@@ -33,26 +35,32 @@ FALSE_BOX = Detection(track_id=7, category="car", box_px=(3.0, 4.0, 20.0, 30.0),
 
 @lru_cache(maxsize=1)
 def good() -> Recording:
-    """0.3 s of the car with a LiDAR of 24 columns and two cameras, a false box in every image, pictures of
-    noise, and every tenth message of the IMU."""
-    recording = recorded(staged(duration_s=0.3, columns=24, size_px=SIZE_PX)).recording
-    rng = np.random.default_rng(0)
-    messages: list[Measurement] = []
+    """0.3 s of the car, small: the target's points and a fiftieth of the others, two cameras, pictures of one
+    with a false box in every image, and every tenth message of the IMU. Its target is scored."""
+    recording = recorded(staged(duration_s=0.3, columns=COLUMNS, size_px=SIZE_PX)).recording
+    truth, messages, scans = recording.truth, list[Measurement](), dict[tuple[str, int], ScanTruth]()
+    of_scans = {(one.sensor, one.seq): one for one in truth.scans}
     for message in recording.messages:
         if message.seq % 10 if isinstance(message, EgoMotion) else message.sensor not in SENSORS:
             continue
+        if isinstance(message, LidarScan):
+            both = Sweep(scan=message, truth=of_scans[message.sensor, message.seq])
+            kept = (both.truth.object_id == truth.target_id) | (np.arange(len(message.xyz_m)) % 50 == 0)
+            message, scans[message.sensor, message.seq] = both.keep(kept).scan, both.keep(kept).truth
         if isinstance(message, Detections):
-            rgb = rng.integers(0, 256, (SIZE_PX[1], SIZE_PX[0], 3), dtype=np.uint8)
             stamps = {name: getattr(message, name) for name in ("sensor", "seq", "stamp_ns", "arrival_ns")}
-            messages.append(CameraImage(rgb=rgb, **stamps))
+            if message.sensor == SENSORS[1]:
+                rgb = np.full((SIZE_PX[1], SIZE_PX[0], 3), 20 + message.seq, dtype=np.uint8)
+                messages.append(CameraImage(rgb=rgb, **stamps))
             message = replace(message, boxes=(*message.boxes, FALSE_BOX))
         messages.append(message)
     images = tuple(
         replace(image, detection_object_id=(*image.detection_object_id, -1))
-        for image in recording.truth.images
+        for image in truth.images
         if image.sensor in SENSORS
     )
-    return replace(recording, messages=tuple(messages), truth=replace(recording.truth, images=images))
+    truth = replace(truth, images=images, scans=tuple(scans.values()))
+    return replace(recording, messages=tuple(messages), truth=truth)
 
 
 @lru_cache(maxsize=1)
