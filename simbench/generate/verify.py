@@ -4,9 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from scenarios.errors import BadInput
+from scenarios.load import list_scenarios
 from simbench.formats.store import first_difference, read_recording
 from simbench.generate.work import job_of
 from simbench.run import recording_of
+
+
+def _check_scenario(scenario: str, folder: Path) -> None:
+    """BadInput: a recording, which may come from anybody, names a file that is no scenario."""
+    if scenario not in list_scenarios() and Path(scenario).suffix not in (".yaml", ".yml"):
+        raise BadInput(
+            "cannot be made again: its scenario is neither of the catalogue nor a YAML file", file=str(folder)
+        )
 
 
 def verified(folder: Path, *, rerun: bool) -> tuple[str, bool]:
@@ -18,6 +28,7 @@ def verified(folder: Path, *, rerun: bool) -> tuple[str, bool]:
     count = 0 if part is None else part.count
     if not rerun:
         return f"{folder}: complete, {count} messages, all hashes right", True
+    _check_scenario(stored.manifest.source.scenario, folder)
     again = recording_of(job_of(stored.manifest.source))[2].recording
     where = first_difference(stored.recording, again)
     if where is not None:

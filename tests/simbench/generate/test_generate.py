@@ -195,3 +195,12 @@ def test_both_rigs_of_a_drive_are_in_the_same_part(tmp_path: Path) -> None:
     for seed in range(5):
         assert part["car", seed] == part["wearable", seed] == part_of("overtake-approach", seed, (50, 25, 25))
     assert len(set(part.values())) > 1
+
+
+def test_a_recording_that_names_a_file_which_is_no_scenario_is_not_made_again(made: Path) -> None:
+    path = made / FIRST / MANIFEST
+    text = path.read_text(encoding="utf-8").replace('"overtake-approach"', '"/etc/passwd"')
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(BadInput, match="neither of the catalogue nor a YAML file") as told:
+        verified(made / FIRST, rerun=True)
+    assert "root:" not in str(told.value)
