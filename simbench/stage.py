@@ -127,7 +127,7 @@ def as_told(job: Job, staged: Stage, recording: Recording) -> Recording:
 @contextmanager
 def pictures(job: Job, staged: Stage) -> Iterator[TakePicture | None]:
     """Takes pictures for a job whose pipelines read them, else None. Raises as `camera_of`."""
-    if not any(reads_images(name) for name in job.pipelines):
+    if job.images == "none" or not any(reads_images(name) for name in job.pipelines):
         yield None
         return
     with camera_of(job, staged) as picture:
