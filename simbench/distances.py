@@ -99,9 +99,7 @@ def _true_m(
 ) -> Float64[np.ndarray, " n"]:
     """Planar distance of the box's centre from the LiDAR's rest position, ego frame."""
     truth = recording.truth
-    r_ego, p_ego = truth.poses.ego(t_ns)
-    _, p_box = truth.poses.object_centre(object_id, t_ns)
-    centre = np.einsum("nji,nj->ni", r_ego, p_box - p_ego)
+    _, centre = truth.box_in_ego(object_id, t_ns)
     return planar_range_m(centre - truth.calibration.T_ego_sensor[lidar].translation_m)
 
 

@@ -111,7 +111,7 @@ def _guarded(
             views=views, distances=curves, timings_s=clock.laps,
         )  # fmt: skip
     except Exception as error:  # a bug of ours must not end the other jobs, nor pass for a result
-        why = last_line(error)
+        why = str(error) if isinstance(error, BadInput) else last_line(error)
         bad = tuple(failed(name, "bench_error", why) for name in (*job.pipelines, ORACLE))
         return JobResult(job=job, scenario=scenario, faults=faults, shake="", receipts=(), cases=bad)
 

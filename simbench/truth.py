@@ -128,6 +128,12 @@ class Truth:
         """Centre of the target's box in the ego reference frame at t_ns."""
         if self.target_id is None:
             raise ValueError("this scenario has no target")
+        return self.box_in_ego(self.target_id, t_ns)[1]
+
+    def box_in_ego(
+        self, object_id: int, t_ns: Int64[np.ndarray, " n"]
+    ) -> tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]:
+        """T_ego_box at t_ns: axes and centre of an object's box in the ego reference frame."""
         r_ego, p_ego = self.poses.ego(t_ns)
-        _, p_box = self.poses.object_centre(self.target_id, t_ns)
-        return np.einsum("nji,nj->ni", r_ego, p_box - p_ego)
+        r_box, p_box = self.poses.object_centre(object_id, t_ns)
+        return r_ego.transpose(0, 2, 1) @ r_box, np.einsum("nji,nj->ni", r_ego, p_box - p_ego)

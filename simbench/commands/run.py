@@ -129,7 +129,9 @@ def run(
     from simbench.stage import faults_of
 
     targets = tuple(stored_target(target) or target for target in targets)
-    if len(targets) == 1 and targets[0].startswith(MCAP):
+    if any(target.startswith(MCAP) for target in targets):
+        if len(targets) > 1:
+            raise click.UsageError("one ROS 2 bag at a time, and nothing beside it")
         _run_imported(targets[0], topics, pipelines, out, as_json, apart, suite)
     if topics is not None:
         raise click.UsageError("--topics is for a ROS 2 bag (mcap:PATH)")

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float64
 
 from fusion.messages import Detections, FusionOutput, LidarScan, LocalizedObject, Trajectory
 from scenarios.errors import BadInput
@@ -81,16 +80,9 @@ def _objects(recording: Recording, positions: Sequence[Position]) -> np.ndarray:
     said = np.array([p.position_ego_m for p in positions])
     truth = recording.truth
     ids = np.array([info.object_id for info in truth.objects], dtype=np.int64)
-    away = np.stack([np.linalg.norm((said - _centres(recording, int(i), t_ns))[:, :2], axis=1) for i in ids])
+    away = np.stack([np.linalg.norm((said - truth.box_in_ego(int(i), t_ns)[1])[:, :2], axis=1) for i in ids])
     nearest = away.argmin(axis=0)
     return np.where(away[nearest, np.arange(len(t_ns))] <= GATE_M, ids[nearest], -1)
-
-
-def _centres(recording: Recording, object_id: int, t_ns: np.ndarray) -> Float64[np.ndarray, "n 3"]:
-    poses = recording.truth.poses
-    rotation, origin = poses.ego(t_ns)
-    _, centre = poses.object_centre(object_id, t_ns)
-    return np.einsum("nji,nj->ni", rotation, centre - origin)
 
 
 def _object(of_rows: np.ndarray) -> int:

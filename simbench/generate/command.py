@@ -83,7 +83,7 @@ def generate_recordings(asked: Request) -> int:
         kept = [sight for row in rows if row.status == "ok" for sight in read_sights(out / row.name)]
         required = [str(one) for one in asked.required]
         page = write_card(made, kept, out, title=title, command=command, required=required, beside=beside)
-    return _told(rows, jobs, out, page)
+    return _told(rows, out, page)
 
 
 def _jobs(asked: Request) -> list[Job]:
@@ -171,18 +171,14 @@ def _line(row: Row) -> str:
     )
 
 
-def _told(rows: Sequence[Row], jobs: Sequence[Job], out: Path, page: Path) -> int:
+def _told(rows: Sequence[Row], out: Path, page: Path) -> int:
     good = [row for row in rows if row.status == "ok"]
     rejected = sum(row.status == "rejected" for row in rows)
     for row in rows:
         if row.status not in ("ok", "rejected"):
             click.echo(f"{row.name}: {row.status}: {row.why}")
     size = sum(row.size_bytes for row in good)
-    driven_s = sum(
-        load_scenario(job.scenario, job.changes).resolve(job.seed).system(job.system).duration_s
-        for job, row in zip(jobs, rows, strict=True)
-        if row.status == "ok"
-    )
+    driven_s = sum(row.driven_s for row in good)
     words = f"{len(good)} of {len(rows)} recordings, {size / 1e6:.1f} MB"
     words += f", {size / 1e6 / driven_s:.1f} MB per second of driving" if good else ""
     words += f", {rejected} rejected" if rejected else ""

@@ -11,6 +11,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
 
+from scenarios.scenario import Scenario
 from simbench.campaign.job_key import job_key
 from simbench.cards.statistics import sights
 from simbench.cards.table import write_sights
@@ -19,6 +20,7 @@ from simbench.formats.kitti_write import write_kitti
 from simbench.formats.pcd import write_pcd_folder
 from simbench.formats.png import Pictures
 from simbench.formats.ros2.bag import write_bag
+from simbench.formats.scene import RecordedScene
 from simbench.formats.store import Injected, Source, write_recording
 from simbench.generate.require import Requirement, missed
 from simbench.recording import Recording
@@ -42,7 +44,7 @@ class Task:
 @dataclass(frozen=True, kw_only=True)
 class Row:
     """What became of a recording: `ok`, `rejected` (it does not hold what is required), or what went wrong.
-    why: None where it is there. size_bytes: of its folder. seconds: that it
+    why: None where it is there. size_bytes: of its folders. driven_s: how long the drive is. seconds: that it
     took to make, and to write."""
 
     name: str
@@ -51,6 +53,7 @@ class Row:
     size_bytes: int = 0
     messages: int = 0
     sha256: str = ""
+    driven_s: float = 0.0
     seconds: tuple[float, float] = (0.0, 0.0)
 
 
@@ -65,7 +68,7 @@ def row_of(task: Task) -> str:
     """Make a recording and write it; its row as JSON text."""
     begun = time.perf_counter()
     with Pictures() as pictures:
-        _, faults, made = recording_of(task.job, pictures.beside)
+        scenario, faults, made = recording_of(task.job, pictures.beside)
         if why := mismatch(made.receipts):
             return json.dumps(asdict(Row(name=task.name, status="receipt_mismatch", why=why)))
         if why := missed(task.required, made.recording):
@@ -85,9 +88,15 @@ def row_of(task: Task) -> str:
     done = time.perf_counter()
     row = Row(
         name=task.name, status="ok", size_bytes=size, messages=part.count, sha256=part.sha256,
-        seconds=(written - begun, done - written),
+        driven_s=_driven_s(scenario, task.job.system), seconds=(written - begun, done - written),
     )  # fmt: skip
     return json.dumps(asdict(row))
+
+
+def _driven_s(scenario: Scenario | RecordedScene, system: str) -> float:
+    if isinstance(scenario, RecordedScene):
+        return scenario.duration_s
+    return scenario.system(system).duration_s
 
 
 def write_as(one: Format, recording: Recording, task: Task) -> int:

@@ -69,6 +69,10 @@ class RecordedTaker:
     def take(self, camera: str, capture_ns: int) -> UInt8[np.ndarray, "h w 3"]:
         """KeyError: no image was taken then."""
         shown = {s.image_ns: s for s in self._player.drive.snapshots}[capture_ns]
-        rgb = self._player.picture(shown)
-        size = (rgb.shape[1] * self._sharper, rgb.shape[0] * self._sharper)
-        return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+        return enlarged(self._player.picture(shown), self._sharper)
+
+
+def enlarged(rgb: UInt8[np.ndarray, "h w 3"], sharper: int) -> UInt8[np.ndarray, "h w 3"]:
+    """A picture with so many times the pixels along each side."""
+    size = (rgb.shape[1] * sharper, rgb.shape[0] * sharper)
+    return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-import cv2
 import numpy as np
 from jaxtyping import UInt8
 
@@ -15,6 +14,7 @@ from simbench.case import Images, Job
 from simbench.exhibit import PairView
 from simbench.formats.stored import play_stored
 from simbench.recording import Recording
+from simbench.report.recorded import enlarged
 
 
 class StoredReplay:
@@ -75,6 +75,4 @@ class StoredTaker:
 
     def take(self, camera: str, capture_ns: int) -> UInt8[np.ndarray, "h w 3"]:
         """KeyError: no picture was taken then."""
-        rgb = self._taken[camera, capture_ns]
-        size = (rgb.shape[1] * self._sharper, rgb.shape[0] * self._sharper)
-        return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
+        return enlarged(self._taken[camera, capture_ns], self._sharper)

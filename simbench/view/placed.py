@@ -22,18 +22,16 @@ class Placed:
 
 def placed(recording: Recording, object_ids: Sequence[int], t_ns: int) -> Placed | None:
     """Boxes of objects at one true time; None: the poses do not reach so far."""
-    poses = recording.truth.poses
     try:
         at = np.array([t_ns], dtype=np.int64)
-        r_ego, p_ego = poses.ego(at)
-        found = [poses.object_centre(i, at) for i in object_ids]
+        with np.errstate(invalid="ignore", over="ignore"):
+            found = [recording.truth.box_in_ego(i, at) for i in object_ids]
     except (ValueError, KeyError, OverflowError):
         return None
-    to_ego = r_ego[0].T
-    with np.errstate(invalid="ignore", over="ignore"):
-        centres = [to_ego @ (p[0] - p_ego[0]) for _, p in found]
-        rotations = [to_ego @ r[0] for r, _ in found]
-    return Placed(centre_m=np.array(centres).reshape(-1, 3), rotation=np.array(rotations).reshape(-1, 3, 3))
+    return Placed(
+        centre_m=np.array([p for _, p in found]).reshape(-1, 3),
+        rotation=np.array([r for r, _ in found]).reshape(-1, 3, 3),
+    )
 
 
 def middle_ns(scan: LidarScan, fire_ns: Int64[np.ndarray, " n"], period_ns: int) -> int:

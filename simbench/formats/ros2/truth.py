@@ -47,13 +47,11 @@ def truth_messages(truth: Truth, start_ns: int, epoch_ns: int) -> Iterator[Timed
     ]
     yield start_ns, TRUTH_TF_STATIC, ros.TF, {"transforms": fixed}
     t_ns = instants_ns(truth)
-    r_ego, p_ego = truth.poses.ego(t_ns)
-    ego = _listed(r_ego, p_ego)
+    ego = _listed(*truth.poses.ego(t_ns))
     world, near = dict[ObjectInfo, Listed](), dict[ObjectInfo, Listed]()
     for info in truth.objects:
-        r, p = truth.poses.object_centre(info.object_id, t_ns)
-        world[info] = _listed(r, p)
-        near[info] = _listed(r_ego.transpose(0, 2, 1) @ r, np.einsum("nji,nj->ni", r_ego, p - p_ego))
+        world[info] = _listed(*truth.poses.object_centre(info.object_id, t_ns))
+        near[info] = _listed(*truth.box_in_ego(info.object_id, t_ns))
     for i, t in enumerate(t_ns.tolist()):
         moved = [encode.placed(*ego[i], t + epoch_ns, WORLD, EGO)]
         moved += [encode.placed(*at[i], t + epoch_ns, WORLD, frame_of(info)) for info, at in world.items()]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import io
 import struct
+import threading
 import tracemalloc
 import zlib
 from pathlib import Path
+from unittest import mock
 
 import matplotlib.image
 import numpy as np
@@ -79,6 +81,20 @@ def test_a_picture_that_changed_after_it_was_taken_is_encoded_as_it_is() -> None
         assert take(None, "front", 0, 0) is taken  # type: ignore[arg-type]
         changed = taken + np.uint8(9)
         assert np.array_equal(decode(pictures.png(changed)), changed)
+        assert pictures.png(taken) == encode(taken)
+
+
+def test_a_picture_is_encoded_once_and_when_it_is_taken() -> None:
+    taken, begun = np.zeros((4, 5, 3), dtype=np.uint8), threading.Event()
+
+    def counted(rgb: np.ndarray) -> bytes:
+        assert not begun.is_set(), "encoded twice"
+        begun.set()
+        return encode(rgb)
+
+    with mock.patch("simbench.formats.png.encode", counted), Pictures() as pictures:
+        pictures.beside(lambda motion, camera, seq, mid_ns: taken)(None, "front", 0, 0)  # type: ignore[arg-type]
+        assert begun.wait(10.0), "not before it is asked for"
         assert pictures.png(taken) == encode(taken)
 
 

@@ -89,5 +89,7 @@ def test_what_is_no_bag_is_told(tmp_path: Path) -> None:
     for target in (tmp_path / "x.mcap", tmp_path / "gone.mcap", tmp_path):
         done = run(f"mcap:{target}", "--out", str(tmp_path / "o"))
         assert done.exit_code == 2
+    done = run("mcap:a", "overtake-approach", "--out", str(tmp_path / "o"))
+    assert done.exit_code == 2 and "one ROS 2 bag at a time" in done.output
     done = run("overtake-approach", "--topics", "x.yaml", "--out", str(tmp_path / "o"))
     assert done.exit_code == 2 and "--topics is for a ROS 2 bag" in done.output
