@@ -72,7 +72,7 @@ class RecordedTaker:
         return enlarged(self._player.picture(shown), self._sharper)
 
 
-def enlarged(rgb: UInt8[np.ndarray, "h w 3"], sharper: int) -> UInt8[np.ndarray, "h w 3"]:
+def enlarged(rgb: UInt8[np.ndarray, "h w 3"], sharper: int) -> UInt8[np.ndarray, "h_out w_out 3"]:
     """A picture with so many times the pixels along each side."""
     size = (rgb.shape[1] * sharper, rgb.shape[0] * sharper)
     return np.asarray(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), dtype=np.uint8)
