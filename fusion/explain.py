@@ -97,7 +97,8 @@ def explain_aoi(
             for c in clusters
         )
         divergences = np.array([c.divergence for c in candidates])
-        chosen = select(divergences, literal_kl=shape.literal_kl) if candidates else None
+        counts = np.array([len(c) for c in clusters], dtype=np.int64)
+        chosen = select(divergences, counts, shape.pick) if candidates else None
     return AoiExplanation(
         camera=camera,
         detection=detection,

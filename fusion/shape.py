@@ -10,7 +10,8 @@ Similarity to the benchmark shape S* of the category, with every cell smoothed b
     D(P || Q) = sum P ln(P / Q),        s = 2 / (1 + exp(D)),     0 < s <= 1.
 
 The paper prints neither its "modified sigmoid" nor a sign: it takes "argmax of D_KL" of what it calls the
-highest score. Taken literally that is the *least* similar cluster; `literal_kl` keeps it, to show that.
+highest score. Taken literally that is the *least* similar cluster; `pick` can be that, to show it, or the
+cluster of most points, to show what the filter is worth.
 """
 
 from __future__ import annotations
@@ -25,11 +26,12 @@ from types import MappingProxyType
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Float64
+from jaxtyping import Float, Float64, Int
 
 from fusion.geometry import readonly
 
 MainAxis = Literal["vertical", "horizontal"]
+Pick = Literal["most_similar", "least_similar", "most_points"]
 SHAPES_SCHEMA = "fusion-shapes/1"
 
 _CELL_NUMBER = np.array([1, 3])  # of (column, row), row by row
@@ -43,7 +45,7 @@ class ShapeConfig:
 
     max_rotation_deg: float = 40.0  # paper
     smoothing: float = 1e-3  # ours: added to every cell, then normalised
-    literal_kl: bool = False  # paper's equation as printed; see the module's text
+    pick: Pick = "most_similar"  # paper's equation as printed: least_similar; see the module's text
 
 
 def main_axis(category: str) -> MainAxis:
@@ -115,9 +117,12 @@ def similarity(divergence: float) -> float:
     return 2.0 / (1.0 + math.exp(min(divergence, 700.0)))
 
 
-def select(divergences: Float[np.ndarray, " m"], *, literal_kl: bool) -> int:
-    """The chosen cluster: the most similar one (ties: the first), or by the paper's printed argmax of D."""
-    return int(np.argmax(divergences) if literal_kl else np.argmin(divergences))
+def select(divergences: Float[np.ndarray, " m"], counts: Int[np.ndarray, " m"], pick: Pick) -> int:
+    """The chosen cluster (ties: the first): the most similar one, the paper's printed argmax of D, or that of
+    most points."""
+    if pick == "most_points":
+        return int(np.argmax(counts))
+    return int(np.argmax(divergences) if pick == "least_similar" else np.argmin(divergences))
 
 
 def learn_shape(

@@ -71,7 +71,7 @@ class ProbabilisticConfig:
 
     @staticmethod
     def paper() -> ProbabilisticConfig:
-        """As printed, but for the argmax of KL, which picks the least similar cluster (`literal_kl`)."""
+        """As printed, but for the argmax of KL, which picks the least similar cluster (`least_similar`)."""
         return ProbabilisticConfig(
             ground=GroundConfig.paper(),
             clustering=ClusteringConfig.paper(),

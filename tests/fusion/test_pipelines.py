@@ -60,7 +60,7 @@ def test_the_literal_argmax_of_kl_takes_the_least_similar_candidate() -> None:
     scan, _ = street()
     shifted, shapes = seen(30.0), load_benchmark_shapes()
     config = ProbabilisticConfig()
-    literal = replace(config, shape=ShapeConfig(literal_kl=True))
+    literal = replace(config, shape=ShapeConfig(pick="least_similar"))
     several = 0
     for sane, odd in zip(
         explain_scan(scan, (shifted,), CALIBRATION, CATEGORIES, config, shapes),

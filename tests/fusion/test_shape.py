@@ -126,10 +126,11 @@ def test_empty_cells_do_not_make_the_divergence_infinite() -> None:
     assert similarity(1e6) > 0.0
 
 
-def test_the_literal_argmax_picks_the_least_similar_cluster() -> None:
-    divergences = np.array([0.4, 0.1, 2.0])
-    assert select(divergences, literal_kl=False) == 1
-    assert select(divergences, literal_kl=True) == 2
+def test_the_most_similar_cluster_is_chosen_or_by_the_literal_argmax_the_least_or_the_largest() -> None:
+    divergences, counts = np.array([0.4, 0.1, 2.0]), np.array([9, 5, 7])
+    assert select(divergences, counts, "most_similar") == 1
+    assert select(divergences, counts, "least_similar") == 2
+    assert select(divergences, counts, "most_points") == 0
 
 
 def test_a_learned_shape_is_the_mean_of_upright_descriptors() -> None:

@@ -12,7 +12,7 @@ import pytest
 from jaxtyping import Float64
 
 from fusion.pipelines.probabilistic import Probabilistic, ProbabilisticConfig
-from fusion.shape import ShapeConfig
+from fusion.shape import Pick, ShapeConfig
 from scenarios.errors import BadInput
 from scenarios.faults import FaultSpec, TriggerOffset
 from simbench.case import ORACLE, Case, Job, JobResult
@@ -218,8 +218,9 @@ def test_the_literal_argmax_of_kl_lowers_the_score() -> None:
     at = staged("wearable", duration_s=None, columns=256, size_px=(320, 200), background=True)
     recording = recorded(at).recording
     found = []
-    for literal in (False, True):
-        config = ProbabilisticConfig(shape=ShapeConfig(literal_kl=literal))
+    picks: tuple[Pick, ...] = ("most_similar", "least_similar")
+    for pick in picks:
+        config = ProbabilisticConfig(shape=ShapeConfig(pick=pick))
         driven = drive(Probabilistic(config), recording.calibration, recording.categories, recording.messages)
         scores = score(recording, driven.outputs, driven.trajectories)
         found.append([value(scores, metric) for metric in ("tpr", "precision", "recall")])
