@@ -168,7 +168,7 @@ def weigh(
     """As `infer`, with Sigma taken apart already."""
     if not np.isfinite(values).all():
         raise ValueError("an observed value is not finite: leave its cell out")
-    distance2 = _distance2(cells, values, white[0])
+    distance2 = distance_squared(cells, values, white[0])
     log_likelihood = -0.5 * distance2 - white[1] - 0.5 * len(values) * np.log(2.0 * np.pi)
     total = float(logsumexp(log_likelihood))
     weights = np.exp(log_likelihood - total)
@@ -190,9 +190,10 @@ def resample(
     return np.minimum(np.searchsorted(ends, places, side="right"), len(weights) - 1)
 
 
-def _distance2(
+def distance_squared(
     cells: Emulated, values: Float64[np.ndarray, " k"], white: Float64[np.ndarray, "m k k"]
 ) -> Float64[np.ndarray, " m"]:
+    """Squared Mahalanobis distance of values from each draw's mean."""
     apart = np.einsum("mab,mb->ma", white, values - cells.mean)
     return (apart * apart).sum(axis=1)
 
