@@ -3,7 +3,10 @@
 k(x, y) = c² + b² (x - 1/2)·(y - 1/2) + a² (1 + r + r²/3) exp(-r), r² = 5 Σ_j (x_j - y_j)² / l_j²: a constant
 and a slope per input with wide normal priors (a regressed mean), and a Matérn 5/2 bend with a length per
 input (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 2.7, eq. 4.17 and section
-5.4.1). Inputs are from 0 to 1, outputs have mean 0 and SD 1. Priors are log-normal.
+5.4.1). Inputs are from 0 to 1, outputs have mean 0 and SD 1. Priors are log-normal;
+that of lengths grows as the distance between places does, with the root of the number of inputs that vary
+(Hvarfner et al., Vanilla Bayesian optimization performs great in high dimensions, 2024): many short lengths
+look like noise.
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from jaxtyping import Float64
 from scipy.linalg import cho_solve, cholesky
 
 CONSTANT_SD, SLOPE_SD = 3.0, 2.0
-LIKELY_LENGTH, LIKELY_AMPLITUDE, LIKELY_NOISE = 1.0, 0.7, 0.3
+LIKELY_AMPLITUDE, LIKELY_NOISE = 0.7, 0.3
 LENGTH_SPREAD, AMPLITUDE_SPREAD, NOISE_SPREAD = 1.0, 1.0, 1.5  # SDs of logarithms
 LENGTH_BOUNDS, AMPLITUDE_BOUNDS, NOISE_BOUNDS = (0.05, 20.0), (0.01, 5.0), (1e-3, 3.0)
 STARTS = ((0.5, 0.7, 0.3), (1.5, 0.7, 0.1), (0.3, 1.0, 0.6))  # length, amplitude, noise
@@ -52,13 +55,12 @@ def likeliest(x: Float64[np.ndarray, "n d"], z: Float64[np.ndarray, " n"]) -> Hy
     from scipy.optimize import minimize
 
     d = x.shape[1]
-    apart = _apart(x)
-    mean = _mean(x, x)
+    apart, mean, likely = _apart(x), _mean(x, x), _likely(x)
     bounds = np.log([*[LENGTH_BOUNDS] * d, AMPLITUDE_BOUNDS, NOISE_BOUNDS])
 
     def climb(start: Float64[np.ndarray, " h"], steps: int) -> tuple[float, Float64[np.ndarray, " h"]]:
         found = minimize(
-            lambda u: _loss(u, z, apart, mean), start, jac=True, method="L-BFGS-B", bounds=bounds,
+            lambda u: _loss(u, z, apart, mean, likely), start, jac=True, method="L-BFGS-B", bounds=bounds,
             options={"maxiter": steps},
         )  # fmt: skip
         return float(found.fun), np.asarray(found.x)
@@ -72,7 +74,7 @@ def loss(
     logs: Float64[np.ndarray, " h"], x: Float64[np.ndarray, "n d"], z: Float64[np.ndarray, " n"]
 ) -> tuple[float, Float64[np.ndarray, " h"]]:
     """Minus the log posterior of the logarithms of lengths, amplitude and noise; and its gradient."""
-    return _loss(logs, z, _apart(x), _mean(x, x))
+    return _loss(logs, z, _apart(x), _mean(x, x), _likely(x))
 
 
 def _loss(
@@ -80,6 +82,7 @@ def _loss(
     z: Float64[np.ndarray, " n"],
     apart: Float64[np.ndarray, "d nn"],
     mean: Float64[np.ndarray, "n n"],
+    likely: Float64[np.ndarray, " h"],
 ) -> tuple[float, Float64[np.ndarray, " h"]]:
     hyper, n = _hyper(logs), len(z)
     weights = 5.0 / hyper.lengths**2
@@ -93,11 +96,16 @@ def _loss(
     by_length = weights / 3.0 * (apart @ (pull * fall * (1.0 + r)).ravel())
     slopes = 0.5 * np.array([*by_length, 2.0 * (pull * bend).sum(), 2.0 * hyper.noise**2 * np.trace(pull)])
     d = len(hyper.lengths)
-    likely = np.log([LIKELY_LENGTH] * d + [LIKELY_AMPLITUDE, LIKELY_NOISE])
     spread = np.array([LENGTH_SPREAD] * d + [AMPLITUDE_SPREAD, NOISE_SPREAD])
     off = (logs - likely) / spread
     value = 0.5 * float(z @ alpha) + float(np.log(np.diag(factor)).sum()) + 0.5 * float(off @ off)
     return value, off / spread - slopes
+
+
+def _likely(x: Float64[np.ndarray, "n d"]) -> Float64[np.ndarray, " h"]:
+    """Logarithms of the priors' medians."""
+    length = max(float((np.ptp(x, axis=0) > 0.0).sum()), 1.0) ** 0.5
+    return np.log([length] * x.shape[1] + [LIKELY_AMPLITUDE, LIKELY_NOISE])
 
 
 def _hyper(logs: Float64[np.ndarray, " h"]) -> Hyper:
