@@ -19,6 +19,7 @@ from simbench.commands.explain import explain
 from simbench.commands.frontier import frontier
 from simbench.commands.generate import generate, verify
 from simbench.commands.init import init
+from simbench.commands.reproduce import reproduce
 from simbench.commands.run import demo, run
 from simbench.commands.score import score
 from simbench.commands.stress import stress
@@ -69,6 +70,6 @@ def main() -> None:
 
 for verb in (
     baseline, calibrate, check, compare, demo, describe, doctor, explain, frontier, generate, init, learn,
-    list_, plan, run, score, stress, timeline, verify, view,
+    list_, plan, reproduce, run, score, stress, timeline, verify, view,
 ):  # fmt: skip
     main.add_command(verb)

@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float64
+from jaxtyping import Bool, Float64
 
 from fusion.calibrate_board import Board
 from fusion.camera import PinholeCamera
-from fusion.geometry import Transform, rotation_rpy
+from fusion.geometry import Transform
 from scenarios.errors import BadInput
 
 TRIES = 2000
+AT_ONCE = 100  # tries that are looked at together
+PER_TRY = 6  # numbers: range, pixel, tilt
 ABOVE_GROUND_M = 0.1
 MARGIN_PX = 4.0
 LEAST_FACING = 0.35  # cosine between the LiDAR's view of the board and its normal
@@ -104,69 +106,98 @@ def draw_poses(
 ) -> tuple[Transform, ...]:
     """T_world_board of up to `count` poses; fewer where the volume has no room for them in many tries.
 
-    Ranges are drawn from equal shares of the volume's, one after the other, so that all are covered.
+    Ranges are drawn from equal shares of the volume's, one after the other, so that all are covered. Numbers
+    are drawn beyond the last pose: `rng` is for these poses alone.
     """
     found: list[Transform] = []
     step = (wanted.far_m - wanted.near_m) / count
+    drawn = np.zeros((0, PER_TRY))
     for number in range(count):
-        low = wanted.near_m + number * step
-        for attempt in range(TRIES):
+        low, tried = wanted.near_m + number * step, 0
+        while tried < TRIES:
+            if not len(drawn):
+                drawn = rng.random((AT_ONCE, PER_TRY))
             # Where one range has no room the whole volume is tried.
-            span = (low, low + step) if attempt < TRIES // 2 else (wanted.near_m, wanted.far_m)
-            pose = _pose(sight, rng.uniform(*span), wanted, rng)
-            if pose is not None and _fits(sight, board, pose, wanted):
-                found.append(pose)
+            first = tried < TRIES // 2
+            span = (low, low + step) if first else (wanted.near_m, wanted.far_m)
+            some = drawn[: (TRIES // 2 if first else TRIES) - tried]
+            poses = _poses(sight, span[0] + (span[1] - span[0]) * some[:, 0], some[:, 1:], wanted)
+            good = np.flatnonzero(_fit(sight, board, *poses, wanted))
+            used = int(good[0]) + 1 if len(good) else len(some)
+            drawn, tried = drawn[used:], tried + used
+            if len(good):
+                rotation, translation_m = poses
+                found.append(Transform(rotation=rotation[used - 1], translation_m=translation_m[used - 1]))
                 break
         else:
             break
     return tuple(found)
 
 
-def _pose(sight: Sight, range_m: float, wanted: Wanted, rng: np.random.Generator) -> Transform | None:
-    """A board at a range whose centre is anywhere in the picture, facing the camera but for its tilt."""
+def _poses(
+    sight: Sight, range_m: Float64[np.ndarray, " n"], drawn: Float64[np.ndarray, "n 5"], wanted: Wanted
+) -> tuple[Float64[np.ndarray, "n 3 3"], Float64[np.ndarray, "n 3"]]:
+    """Rotation and place in the world of boards at these ranges whose centre is anywhere in the picture,
+    facing the camera but for their tilt; NaN where there is none. drawn: in 0..1, pixel and tilt."""
     camera = sight.camera
     reach = wanted.radius if wanted.inside else 1.0
     half = 0.5 * np.array([camera.width_px, camera.height_px])
     box = np.minimum(half, reach * float(np.linalg.norm(half)))
-    slope = camera.unproject((half + rng.uniform(-box, box))[None])[0]
-    tilt = np.deg2rad(wanted.tilt_deg) * rng.uniform(-1.0, 1.0, 3)
-    if not np.isfinite(slope).all():
-        return None
-    ahead = np.array([slope[0], slope[1], 1.0])
-    ahead *= range_m / np.linalg.norm(ahead)
+    slope = camera.unproject(half + box * (2.0 * drawn[:, :2] - 1.0))
+    ahead = np.column_stack([slope, np.ones(len(slope))])
+    ahead *= (range_m / np.linalg.norm(ahead, axis=1))[:, None]
     centre = sight.T_world_camera.apply(ahead)
     towards = centre - sight.T_world_camera.translation_m
     if wanted.standing:
         towards = (centre - sight.T_world_lidar.translation_m) * np.array([1.0, 1.0, 0.0])
-    towards = towards / np.linalg.norm(towards)
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     across = np.cross(np.array([0.0, 0.0, -1.0]), towards)
-    if np.linalg.norm(across) < 0.2:
-        return None
-    across /= np.linalg.norm(across)
-    facing = np.column_stack([across, np.cross(towards, across), towards])
-    pitch, yaw, roll = tilt
-    return Transform(
-        rotation=facing @ rotation_rpy(pitch, yaw, roll),  # about the board's x, y and z
-        translation_m=centre,
-    )
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    across = np.where(length < 0.2, np.nan, across / np.maximum(length, 0.2))
+    facing = np.stack([across, np.cross(towards, across), towards], axis=-1)
+    pitch, yaw, roll = (np.deg2rad(wanted.tilt_deg) * (2.0 * drawn[:, 2:] - 1.0)).T
+    return facing @ _turned(pitch, yaw, roll), centre  # about the board's x, y and z
 
 
-def _fits(sight: Sight, board: Board, T_world_board: Transform, wanted: Wanted) -> bool:
-    corners = T_world_board.apply(board.outer_m)
-    if corners[:, 2].min() < ABOVE_GROUND_M:
-        return False
-    centre = T_world_board.translation_m[None]
-    looked = corners if wanted.whole else centre
-    uv = sight.camera.project(sight.T_world_camera.inverse().apply(looked))
+def _turned(
+    x_rad: Float64[np.ndarray, " n"], y_rad: Float64[np.ndarray, " n"], z_rad: Float64[np.ndarray, " n"]
+) -> Float64[np.ndarray, "n 3 3"]:
+    """`rotation_rpy` of many angles."""
+    (cx, cy, cz), (sx, sy, sz) = np.cos([x_rad, y_rad, z_rad]), np.sin([x_rad, y_rad, z_rad])
+    rows = [
+        [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+        [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+        [-sy, cy * sx, cy * cx],
+    ]
+    turned: np.ndarray = np.array(rows).transpose(2, 0, 1)
+    return turned
+
+
+def _fit(
+    sight: Sight,
+    board: Board,
+    rotation: Float64[np.ndarray, "n 3 3"],
+    centre_m: Float64[np.ndarray, "n 3"],
+    wanted: Wanted,
+) -> Bool[np.ndarray, " n"]:
+    """Which of the boards are where they are wanted; False for NaN too."""
+    corners = board.outer_m @ rotation.swapaxes(1, 2) + centre_m[:, None]
+    looked = corners if wanted.whole else centre_m[:, None]
+    uv = sight.camera.project(sight.T_world_camera.inverse().apply(looked).reshape(-1, 3))
     size = np.array([sight.camera.width_px, sight.camera.height_px])
-    if not ((uv >= MARGIN_PX) & (uv <= size - MARGIN_PX)).all():  # False for NaN too
-        return False
-    radius = sight.radius(uv)
-    if (radius.max() > wanted.radius) if wanted.inside else (radius.min() <= wanted.radius):
-        return False
+    radius = sight.radius(uv).reshape(looked.shape[:2])
     seen = sight.T_world_lidar.inverse().apply(looked)
-    elevation = np.arctan2(seen[:, 2], np.linalg.norm(seen[:, :2], axis=1))
-    if elevation.min() < sight.elevation_rad[0] or elevation.max() > sight.elevation_rad[1]:
-        return False
-    view = T_world_board.translation_m - sight.T_world_lidar.translation_m
-    return bool(view @ T_world_board.rotation[:, 2] >= LEAST_FACING * np.linalg.norm(view))
+    elevation = np.arctan2(seen[..., 2], np.linalg.norm(seen[..., :2], axis=-1))
+    lowest, highest = sight.elevation_rad
+    view = centre_m - sight.T_world_lidar.translation_m
+    faced = (view * rotation[:, :, 2]).sum(axis=1) >= LEAST_FACING * np.linalg.norm(view, axis=1)
+    pictured = ((uv >= MARGIN_PX) & (uv <= size - MARGIN_PX)).all(axis=1).reshape(radius.shape)
+    placed = (radius <= wanted.radius).all(axis=1) if wanted.inside else (radius > wanted.radius).all(axis=1)
+    fits: np.ndarray = (
+        (corners[..., 2] >= ABOVE_GROUND_M).all(axis=1)
+        & pictured.all(axis=1)
+        & placed
+        & ((elevation >= lowest) & (elevation <= highest)).all(axis=1)
+        & faced
+    )
+    return fits

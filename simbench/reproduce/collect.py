@@ -1,12 +1,17 @@
-"""What is kept of a run: a value for every pair and frame of every pipeline, small enough for a ledger."""
+"""What is kept of a run: its metrics, and where it is wanted a value for every pair and frame; as a row of a
+ledger."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, astuple, dataclass
+from typing import Any
 
 from simbench.campaign.job_key import job_key
-from simbench.case import Case, Job
+from simbench.campaign.key import task_key
+from simbench.case import Case
+from simbench.reproduce.plan import Ask, BoardAsk
 from simbench.run import run_job
 from simbench.score.localization import Fix
 
@@ -37,50 +42,81 @@ class FrameValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Run:
-    """One pipeline on one drive. metrics: its rows by name. why: None where all went well."""
+    """One pipeline on one drive. metrics: its rows by name. why: None where all went well. pairs, frames:
+    empty where they are not kept."""
 
     pipeline: str
     seed: int
     why: str | None
     metrics: dict[str, float | None]
-    pairs: tuple[PairValue, ...]
-    frames: tuple[FrameValue, ...]
+    pairs: tuple[PairValue, ...] = ()
+    frames: tuple[FrameValue, ...] = ()
 
 
-def key_of(job: Job) -> str:
-    """The key of a run, wherever it is made."""
-    return job_key(job, what="reproduce")
+@dataclass(frozen=True, kw_only=True)
+class Board:
+    """TPR of a static board in the calibrated zone of one LiDAR-camera pair, with the found calibration and
+    with the true one [0..1]; None: no calibration comes about."""
+
+    system: str
+    camera: str
+    seed: int
+    tpr: float | None
+    tpr_true: float | None
 
 
-def row_of(job: Job) -> str:
-    """Run a job; all its pipelines, and the oracle, as JSON text."""
-    return json.dumps([asdict(run_of(case, job.seed)) for case in run_job(job).cases], allow_nan=False)
+def key_of(ask: Ask | BoardAsk) -> str:
+    """The key of a row, wherever it is made."""
+    if isinstance(ask, BoardAsk):
+        return task_key(case={"what": "reproduce", **asdict(ask)}, config={})
+    return job_key(ask.job, what="reproduce", whole=ask.whole)
 
 
-def runs_of(text: str) -> tuple[Run, ...]:
-    """What `row_of` wrote."""
+def row_of(ask: Ask | BoardAsk) -> str:
+    """Do what is asked; what is kept of it, as JSON text."""
+    if isinstance(ask, BoardAsk):
+        return json.dumps([asdict(board) for board in boards_of(ask)], allow_nan=False)
+    cases = run_job(ask.job).cases
+    return json.dumps([_plain(run_of(case, ask.job.seed, ask.whole)) for case in cases], allow_nan=False)
+
+
+def boards_read(text: str) -> tuple[Board, ...]:
+    """What `row_of` wrote of a calibration."""
+    return tuple(Board(**one) for one in json.loads(text))
+
+
+def runs_read(text: str) -> tuple[Run, ...]:
+    """What `row_of` wrote of a run."""
     return tuple(
         Run(
-            **{
-                **one,
-                "pairs": tuple(PairValue(**pair) for pair in one["pairs"]),
-                "frames": tuple(
-                    FrameValue(
-                        scan_seq=frame["scan_seq"],
-                        true_m=_pair(frame["true_m"]),
-                        gnss_m=_pair(frame["gnss_m"]),
-                    )
-                    for frame in one["frames"]
-                ),
-            }
+            pipeline=one["pipeline"],
+            seed=one["seed"],
+            why=one["why"],
+            metrics=one["metrics"],
+            pairs=tuple(PairValue(**dict(zip(_PAIR, pair, strict=True))) for pair in one["pairs"]),
+            frames=tuple(
+                FrameValue(scan_seq=frame[0], true_m=_pair(frame[1]), gnss_m=_pair(frame[2]))
+                for frame in one["frames"]
+            ),
         )
         for one in json.loads(text)
     )
 
 
-def run_of(case: Case, seed: int) -> Run:
+_PAIR = tuple(PairValue.__dataclass_fields__)
+
+
+def _plain(run: Run) -> dict[str, Any]:
+    """Pairs and frames as rows without names, or a ledger would hold little else than names."""
+    return {
+        "pipeline": run.pipeline, "seed": run.seed, "why": run.why, "metrics": run.metrics,
+        "pairs": [astuple(pair) for pair in run.pairs], "frames": [astuple(frame) for frame in run.frames],
+    }  # fmt: skip
+
+
+def run_of(case: Case, seed: int, whole: bool = True) -> Run:
     """What is kept of a case."""
-    scores = case.scores
+    scores = case.scores if whole else None
     return Run(
         pipeline=case.pipeline,
         seed=seed,
@@ -106,10 +142,31 @@ def run_of(case: Case, seed: int) -> Run:
     )  # fmt: skip
 
 
+def boards_of(ask: BoardAsk) -> tuple[Board, ...]:
+    """Calibrate a rig as the paper does, with errors of hand (`calibration/study.py`)."""
+    from simbench.calibration.study import Settings, calibrate_rig
+    from simbench.calibration.text import calibrated, mean_of
+
+    study = calibrate_rig(Settings(rig=ask.rig, seed=ask.seed), lambda _: None)
+    found = [(pair.camera, mean_of(calibrated(pair))) for pair in study.pairs]
+    return tuple(
+        Board(
+            system=ask.system, camera=camera, seed=ask.seed, tpr=mean.get("tpr"),
+            tpr_true=mean.get("tpr_true"),
+        )
+        for camera, mean in found
+    )  # fmt: skip
+
+
+def values_of(runs: Sequence[Run], metric: str) -> dict[int, float | None]:
+    """A metric by seed."""
+    return {run.seed: run.metrics.get(metric) for run in runs}
+
+
 def _error(fix: Fix | None, reference: str) -> tuple[float, float] | None:
     error = None if fix is None else fix.error_m(reference)
     return None if error is None else (float(error[0]), float(error[1]))
 
 
-def _pair(value: list[float] | None) -> tuple[float, float] | None:
+def _pair(value: Sequence[float] | None) -> tuple[float, float] | None:
     return None if value is None else (value[0], value[1])

@@ -1,9 +1,9 @@
-"""What has to be run, part by part. The same runs whatever was run before: the ledger tells which are missing.
+"""What has to be run, part by part; the ledger tells what is there already.
 
 | part | what | answers |
 |---|---|---|
 | board | a calibration with a checkerboard, by rig and seed | Table I |
-| tables | every cell under no error, under all causes at their bounds, under the set that reaches the numbers | Tables II and III, MAE |
+| tables | every cell, without errors, with all at bounds, and as the numbers are reached | II, III, MAE |
 | variants | the method with one step or reading changed | ablation, readings |
 | groups | every set of the groups of causes, each at its bound | attribution, what to mend first |
 | map | trigger offset times body shake | heat map |
@@ -33,11 +33,14 @@ Condition = Literal["none", "bounds", "reached"]
 CONDITIONS: Mapping[Condition, str] = {
     "none": "no error is injected",
     "bounds": "every cause at its physical bound",
-    "reached": "a set found by hand that reaches the paper's first scenario, with brackets bent beyond what is physical",
+    "reached": "found by hand: reaches the paper's first scenario, by brackets that bend unphysically",
 }
 RIGS: Mapping[str, str] = {"car": "car-six-cameras", "wearable": "wearable-front"}
 MAP_OFFSETS_MS = (0.0, 50.0, 100.0, 150.0)
-MAP_SHAKES_DEG: Mapping[str, tuple[float, ...]] = {"car": (0.0, 0.3, 0.55, 1.1), "wearable": (0.0, 1.0, 2.0, 3.0)}
+MAP_SHAKES_DEG: Mapping[str, tuple[float, ...]] = {
+    "car": (0.0, 0.3, 0.55, 1.1),
+    "wearable": (0.0, 1.0, 2.0, 3.0),
+}
 STRIP_TIMES = (0.5, 1.0, 2.0, 4.0)
 FIRST_FIT_SEED = 1000
 
@@ -62,8 +65,8 @@ QUICK = Size(name="quick", seeds=2, boards=1, variants=1, groups=0, map=0, strip
 
 @dataclass(frozen=True, kw_only=True)
 class Ask:
-    """A run. point: what tells it from the others of its part and cell: the condition; the groups that act; the
-    levels. whole: whether every pair and frame is kept."""
+    """A run. point: what tells it from the others of its part and cell: condition, groups or levels.
+    whole: whether every pair and frame is kept."""
 
     part: Part
     cell: str

@@ -53,7 +53,8 @@ paper_ground = Variant(
     config=replace(_OURS, ground=GroundConfig.paper()),
 )  # fmt: skip
 no_widening = Variant(
-    step=2, title="enlarged box", what="removed: the box as it is", config=replace(_OURS, aoi=AoiConfig(widen=0.0))
+    step=2, title="enlarged box", what="removed: the box as it is",
+    config=replace(_OURS, aoi=AoiConfig(widen=0.0)),
 )  # fmt: skip
 all_sides = Variant(
     step=2, title="enlarged box", what="also 100 % higher",
@@ -94,7 +95,8 @@ paper_smoother = Variant(
     config=replace(_OURS, smoother=SmootherConfig.paper()),
 )  # fmt: skip
 as_printed = Variant(
-    step=0, title="several", what="ground, clusters and smoother as printed", config=ProbabilisticConfig.paper()
+    step=0, title="several", what="ground, clusters and smoother as printed",
+    config=ProbabilisticConfig.paper(),
 )  # fmt: skip
 
 NAMES = (

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int, Int64
 
 from fusion.camera import PinholeCamera
-from fusion.geometry import Transform
+from fusion.geometry import Transform, readonly
 from fusion.messages import BoxPx
 from simbench.motion import Motion, at
 from simbench.sensors import rays
@@ -127,7 +127,8 @@ class RowView(View):
         if points is None or points[..., 2].min() < NEAR_M:
             return (-1.0, -1.0, width + 1.0, height + 1.0)
         uv = _on_their_rows(self._project(points), np.array(instants))
-        (x0, y0), (x1, y1) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
+        u, v = np.ascontiguousarray(uv.T)
+        x0, y0, x1, y1 = float(u.min()), float(v.min()), float(u.max()), float(v.max())
         if x1 <= 0.0 or y1 <= 0.0 or x0 >= width or y0 >= height:
             return None
         return (x0, y0, x1, y1)
@@ -202,35 +203,39 @@ def rim_points(
     found: list[np.ndarray] = []
     box = kind == rays.BOX
     if box.any():
-        edges = np.unique(
-            np.concatenate(
-                [np.insert(_square(), axis, a, axis=1) for axis in range(3) for a in along]
-            ),
-            axis=0,
-        )  # fmt: skip
-        local = edges[None] * size_m[box][:, None, :]
+        local = _edges(stations)[None] * size_m[box][:, None, :]
         found.append(_placed(rotation[:, box], local, centre_m[:, box]))
     turn = np.linspace(0.0, 2.0 * np.pi, RIM, endpoint=False)
     cylinder = kind == rays.CYLINDER
     if cylinder.any():
         ring = np.stack([np.cos(turn), np.sin(turn), np.ones(RIM)], axis=1)
-        for a in along:
-            scale = size_m[cylinder][:, [0, 0, 1]] * np.array([1.0, 1.0, a])
-            found.append(
-                _placed(rotation[:, cylinder], ring[None] * scale[:, None, :], centre_m[:, cylinder])
-            )
+        rings = (ring * np.stack([np.ones_like(along), np.ones_like(along), along], axis=1)[:, None]).reshape(
+            -1, 3
+        )
+        local = rings[None] * size_m[cylinder][:, None, [0, 0, 1]]
+        found.append(_placed(rotation[:, cylinder], local, centre_m[:, cylinder]))
     ball = (kind == rays.SPHERE) | (kind == rays.ELLIPSOID)
     for which, places in ((kind == rays.CAPSULE, along), (ball, np.zeros(1))):
         if not which.any():
             continue
         axes = np.where((kind[which] == rays.ELLIPSOID)[:, None], size_m[which], size_m[which][:, :1])
-        for a in places:
-            middle = centre_m[:, which] + a * size_m[which][:, 1:2] * rotation[:, which][..., 2]
-            rim = _touched(rotation[:, which], axes, middle, turn)
-            if rim is None:
-                return None
-            found.append(rim)
+        turned, axis = rotation[:, which], size_m[which][:, 1:2] * rotation[:, which][..., 2]
+        middle = np.concatenate([centre_m[:, which] + a * axis for a in places], axis=1)
+        rim = _touched(np.tile(turned, (1, len(places), 1, 1)), np.tile(axes, (len(places), 1)), middle, turn)
+        if rim is None:
+            return None
+        found.append(rim)
     return np.concatenate(found, axis=1)
+
+
+@lru_cache(maxsize=4)
+def _edges(stations: int) -> Float64[np.ndarray, "n 3"]:
+    """Points along the edges of the cube from -1 to 1, every one once."""
+    places = [
+        np.insert(_square(), axis, a, axis=1) for axis in range(3) for a in np.linspace(-1.0, 1.0, stations)
+    ]
+    found: np.ndarray = np.unique(np.concatenate(places), axis=0)
+    return readonly(found)
 
 
 def _square() -> Float64[np.ndarray, "4 2"]:

@@ -1,0 +1,66 @@
+"""The whole reproduction as data: all that the page, the tables and the findings are made of."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from scenarios.seeding import stream
+from simbench.explain.attribution import Attribution
+from simbench.reproduce.boards import BoardTable, board_tables
+from simbench.reproduce.campaign import Found
+from simbench.reproduce.cells import BASELINE, GROUND
+from simbench.reproduce.conditions import ConditionTable, condition_tables
+from simbench.reproduce.effects import Mended, attributions, mended
+from simbench.reproduce.fit.study import Fit, fit_rig
+from simbench.reproduce.grids import HeatMap, Strip, heat_maps, strips
+from simbench.reproduce.levels import LEVELS
+from simbench.reproduce.plan import Size
+from simbench.reproduce.steps import Changed, changes
+
+SCHEMA = "simbench-reproduction/1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Answer:
+    """failures: what the bench could not run, which is in no number."""
+
+    size: Size
+    runs: int
+    failures: tuple[str, ...]
+    boards: tuple[BoardTable, ...]
+    conditions: tuple[ConditionTable, ...]
+    steps: tuple[Changed, ...]
+    attributions: dict[str, tuple[Attribution, ...]]
+    mended: tuple[Mended, ...]
+    maps: tuple[HeatMap, ...]
+    strips: tuple[Strip, ...]
+    fits: tuple[Fit, ...]
+
+
+def answer(found: Found) -> Answer:
+    """All of it. Random numbers (bootstrap, draws of frames) by name, so that the same runs give the same
+    bytes."""
+
+    def rng(name: str) -> Any:
+        return stream(0, "reproduce", "answer", name)
+
+    return Answer(
+        size=found.size,
+        runs=len(found.runs) + len({(board.system, board.seed) for board in found.boards}),
+        failures=found.failures,
+        boards=board_tables(found.boards, rng("boards")),
+        conditions=condition_tables(found, rng("conditions")),
+        steps=changes(found, rng("steps")),
+        attributions=attributions(found),
+        mended=mended(found, rng("mended")),
+        maps=heat_maps(found),
+        strips=strips(found),
+        fits=tuple(fit_rig(found, system, baseline) for system in LEVELS for baseline in (BASELINE, GROUND)),
+    )
+
+
+def as_json(found: Answer) -> str:
+    """The stored result. ValueError: a number that is not finite."""
+    return json.dumps({"schema": SCHEMA, **asdict(found)}, indent=1, allow_nan=False) + "\n"
