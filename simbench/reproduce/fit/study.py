@@ -112,7 +112,8 @@ class Sensitivity:
 class Fit:
     """verdict: `fits`: levels within physics reach all values together; `conflict`: they do not, within what
     chance and discrepancy allow (joint_p, Evans & Moshonov 2006, below 0.05), and the posterior is no answer.
-    share: of the prior's draws that fit; samples: draws of the posterior, a row a draw."""
+    share: of the prior's draws that fit; samples: draws of the posterior, a row a draw; plane: what draws of
+    the prior give in the two cells."""
 
     system: str
     baseline: str
@@ -131,6 +132,7 @@ class Fit:
     levels: tuple[LevelPosterior, ...]
     correlations: tuple[tuple[float | None, ...], ...]
     samples: tuple[tuple[float, ...], ...]
+    plane: tuple[tuple[float, ...], ...]
     checked: Checked
     predictions: tuple[Predicted, ...]
     sensitivity: tuple[Sensitivity, ...]
@@ -184,6 +186,7 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
             for row in posterior_correlations(posterior)
         ),
         samples=tuple(tuple(row) for row in draws[posterior.resampled].tolist()),
+        plane=tuple(tuple(row) for row in at.mean[:SHOWN].tolist()),
         checked=_checked(design, values, draws[:CHECKED_DRAWS], emulators, rng("check"), system),
         predictions=_predictions(found, system, baseline, posterior, emulator, cells),
         sensitivity=tuple(
