@@ -47,6 +47,24 @@ def test_it_is_the_tail_of_a_normal_where_the_predictive_is_one() -> None:
     assert found.cell_p == pytest.approx(2 * stats.norm.sf(np.abs(y - 0.5) / np.sqrt(np.diag(RUN))))
 
 
+def test_a_prior_of_two_places_one_in_doubt_against_draws_of_another_program() -> None:
+    """Draws are at (0, 0), well known, or at (1, 1), where the emulator is in doubt."""
+    some = Emulated(
+        mean=np.repeat([[0.0, 0.0], [1.0, 1.0]], 300, axis=0),
+        sd=np.repeat([[0.0] * 2, [1.0] * 2], 300, axis=0),
+    )
+    parts = [
+        stats.multivariate_normal([0.0, 0.0], RUN),
+        stats.multivariate_normal([1.0, 1.0], RUN + np.eye(2)),
+    ]
+    y = np.vstack([part.rvs(20_000, random_state=rng(i)) for i, part in enumerate(parts)])
+    level = 0.5 * (parts[0].pdf(y) + parts[1].pdf(y))
+    for observed in ([0.4, 0.3], [1.6, 1.2], [-1.0, 1.5]):
+        found = conflict(some, Observed.of(observed), RUN, 0.0, rng(7), replicates=6000)
+        here = 0.5 * (parts[0].pdf(observed) + parts[1].pdf(observed))
+        assert found.joint_p == pytest.approx(np.mean(level <= here), abs=0.03)
+
+
 def test_values_each_likely_that_never_come_together_are_in_conflict_jointly_only() -> None:
     level = rng(3).random(2000)
     some = Emulated(mean=np.column_stack([level, level]), sd=np.full((2000, 2), 0.02))
