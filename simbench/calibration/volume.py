@@ -191,11 +191,11 @@ def _fit(
     lowest, highest = sight.elevation_rad
     view = centre_m - sight.T_world_lidar.translation_m
     faced = (view * rotation[:, :, 2]).sum(axis=1) >= LEAST_FACING * np.linalg.norm(view, axis=1)
-    pictured = ((uv >= MARGIN_PX) & (uv <= size - MARGIN_PX)).all(axis=1).reshape(radius.shape)
+    pictured = np.all((uv >= MARGIN_PX) & (uv <= size - MARGIN_PX), axis=1).reshape(radius.shape)
     placed = (radius <= wanted.radius).all(axis=1) if wanted.inside else (radius > wanted.radius).all(axis=1)
     fits: np.ndarray = (
         (corners[..., 2] >= ABOVE_GROUND_M).all(axis=1)
-        & pictured.all(axis=1)
+        & np.all(pictured, axis=1)
         & placed
         & ((elevation >= lowest) & (elevation <= highest)).all(axis=1)
         & faced

@@ -174,7 +174,7 @@ def write_report(
     recorded = all(is_recorded(r.job.scenario) for r in results)
     labelled = recorded and not any(is_stored(r.job.scenario) for r in results)
     sections = tuple(
-        _section(group, number, images=images, out=out) for number, group in enumerate(groups, start=1)
+        section_of(group, number, images=images, out=out) for number, group in enumerate(groups, start=1)
     )
     page = _template().render(
         title=_title(groups),
@@ -250,7 +250,7 @@ def _flat(environment: Mapping[str, object], above: str = "") -> list[tuple[str,
 # -- one group ------------------------------------------------------------------------------------------
 
 
-def _section(group: Group, number: int, *, images: Images, out: Path) -> Section:
+def section_of(group: Group, number: int, *, images: Images, out: Path) -> Section:
     chosen = median_and_worst(group)
     sample = group.results(group.main_side)[0][1]
     median = worst = modes = shapes = over_frames = None

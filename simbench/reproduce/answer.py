@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -39,13 +40,20 @@ class Answer:
     fits: tuple[Fit, ...]
 
 
-def answer(found: Found) -> Answer:
+def answer(found: Found, executor: Executor) -> Answer:
     """All of it. Random numbers (bootstrap, draws of frames) by name, so that the same runs give the same
-    bytes."""
+    bytes. executor: for the fits, each a task of its own."""
 
     def rng(name: str) -> Any:
         return stream(0, "reproduce", "answer", name)
 
+    of_fits = found.part("fit")
+    fits = [
+        executor.submit(fit_rig, of_fits, system, baseline)
+        for system in LEVELS
+        for baseline in (BASELINE, GROUND)
+        if found.size.fit_points
+    ]
     return Answer(
         size=found.size,
         runs=len(found.runs) + len({(board.system, board.seed) for board in found.boards}),
@@ -57,7 +65,7 @@ def answer(found: Found) -> Answer:
         mended=mended(found, rng("mended")),
         maps=heat_maps(found),
         strips=strips(found),
-        fits=tuple(fit_rig(found, system, baseline) for system in LEVELS for baseline in (BASELINE, GROUND)),
+        fits=tuple(fit.result() for fit in fits),
     )
 
 

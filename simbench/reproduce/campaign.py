@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -28,6 +28,12 @@ class Found:
         """The runs of a pipeline in a part and cell, at a point (none given: at all), that went well."""
         return tuple(
             run for at, run in self._by_pipeline.get((part, cell, pipeline), ()) if not point or at == point
+        )
+
+    def part(self, part: Part) -> Found:
+        """The runs of one part only."""
+        return replace(
+            self, runs={ask: runs for ask, runs in self.runs.items() if ask.part == part}, boards=()
         )
 
     @cached_property

@@ -8,21 +8,22 @@ from pathlib import Path
 
 import click
 
+from simbench.campaign.executor import open_executor
 from simbench.campaign.ledger import Done
 from simbench.campaign.lock import only_one
-from simbench.files import prepare_folder, write_text
+from simbench.case import Images
+from simbench.files import prepare_folder
 from simbench.progress import Progress
-from simbench.reproduce.answer import answer, as_json
+from simbench.reproduce.answer import answer
 from simbench.reproduce.campaign import collect, missing, named, open_ledger
 from simbench.reproduce.plan import Ask, BoardAsk, Size
 from simbench.reproduce.write import write_answer
 
-RESULT = "result.json"
 
-
-def run_reproduce(size: Size, *, workers: int | None, out: Path) -> int:
+def run_reproduce(size: Size, *, workers: int | None, images: Images, out: Path) -> int:
     """The exit code: 0 all well, 3 the bench could not make some run. Raises BadInput."""
     prepare_folder(out)
+    count = workers or os.cpu_count() or 1
     begun = time.perf_counter()
     with only_one(out), open_ledger(out) as ledger:
         fresh = len(missing(size, ledger))
@@ -32,10 +33,10 @@ def run_reproduce(size: Size, *, workers: int | None, out: Path) -> int:
         def done(ask: Ask | BoardAsk, row: Done) -> None:
             progress.say(named(ask) + (f": {row.failure}" if row.failure else ""))
 
-        found = collect(size, ledger, workers or os.cpu_count() or 1, done)
-    told = answer(found)
-    write_text(out / RESULT, as_json(told))
-    page = write_answer(told, found, out)
+        found = collect(size, ledger, count, done)
+    with open_executor(min(count, 4)) as executor:
+        told = answer(found, executor)
+    page = write_answer(told, out, images)
     for failure in told.failures:
         click.echo(f"failed: {failure}", err=True)
     click.echo(f"{len(found.runs)} runs, {fresh} of them now, in {time.perf_counter() - begun:.0f} s")

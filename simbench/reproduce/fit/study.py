@@ -273,7 +273,7 @@ def _predictions(
             f"{cell.name}: SD of the paired difference": (
                 _gain_sd(found, cell.name, baseline, count), paired_sd(row), 0.0,
             ),
-            f"{cell.name}: MAE of P-Fusion against the held GNSS [m], printed for both scenarios together": (
+            f"{cell.name}: MAE against the held GNSS [m], printed for both scenarios together": (
                 _values(found, cell.name, METHOD, "mae_m.smooth.gnss", count), MAE[system].mean_m,
                 MAE[system].sd_m,
             ),

@@ -11,7 +11,8 @@ import pytest
 from simbench.case import ORACLE
 from simbench.paper import MAE, TABLE_II
 from simbench.reproduce.cells import BASELINE, CELLS, METHOD
-from simbench.reproduce.collect import FrameValue, PairValue, Run, row_of, run_of, runs_of
+from simbench.reproduce.collect import FrameValue, PairValue, Run, row_of, run_of, runs_read
+from simbench.reproduce.plan import Ask
 from simbench.reproduce.tables import frames_of, mae_table, missed_few, premise, tpr_table
 from simbench.run import run_job
 
@@ -38,9 +39,10 @@ def run(seed: int, tprs: list[float], errors_m: list[tuple[float, float]] | None
 
 
 def test_a_run_keeps_what_was_scored() -> None:
-    job = replace(CELLS[0].job(3), changes=("systems.car.duration_s=0.8",), pipelines=(BASELINE, METHOD))
+    job = CELLS[0].job(3, ("paper-car",), (BASELINE, METHOD))
+    job = replace(job, changes=("systems.car.duration_s=0.8",))
     result = run_job(job)
-    runs = runs_of(row_of(job))
+    runs = runs_read(row_of(Ask(part="tables", cell=CELLS[0].name, point=("reached",), job=job)))
     assert [r.pipeline for r in runs] == [BASELINE, METHOD, ORACLE]
     for case, kept in zip(result.cases, runs, strict=True):
         assert run_of(case, 3) == kept and json.dumps(asdict(kept))
