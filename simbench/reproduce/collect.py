@@ -76,8 +76,12 @@ def row_of(ask: Ask | BoardAsk) -> str:
     """Do what is asked; what is kept of it, as JSON text."""
     if isinstance(ask, BoardAsk):
         return json.dumps([asdict(board) for board in boards_of(ask)], allow_nan=False)
-    cases = run_job(ask.job).cases
-    return json.dumps([_plain(run_of(case, ask.job.seed, ask.whole)) for case in cases], allow_nan=False)
+    return text_of([run_of(case, ask.job.seed, ask.whole) for case in run_job(ask.job).cases])
+
+
+def text_of(runs: Sequence[Run]) -> str:
+    """Runs as the JSON text of a row."""
+    return json.dumps([_plain(run) for run in runs], allow_nan=False)
 
 
 def boards_read(text: str) -> tuple[Board, ...]:

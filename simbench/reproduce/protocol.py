@@ -8,13 +8,13 @@ frames that a pass gives to the draw (Kish's design effect).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float64, Int64
+from scipy.special import stdtr
 
-from simbench.score.statistics import TTest, one_sample_t, paired_t
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,19 +26,22 @@ class Frames:
     run: Int64[np.ndarray, " n"]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Drawn:
-    """One draw of the paper's test. two_sided, one_sided: paired t of after - before; half: one-sample right-
-    tailed t of after against 0.5. None: no spread, or fewer than two frames."""
+    """k draws of the paper's test, an entry each [k], of n frames. t, p_two_sided, p_one_sided: paired t of
+    after - before; half_t, half_p: one-sample right-tailed t of after against 0.5. Not a number: no spread,
+    or fewer than two frames."""
 
     n: int
-    before: float
-    before_sd: float
-    after: float
-    after_sd: float
-    two_sided: TTest | None
-    one_sided: TTest | None
-    half: TTest | None
+    before: Float64[np.ndarray, " k"]
+    before_sd: Float64[np.ndarray, " k"]
+    after: Float64[np.ndarray, " k"]
+    after_sd: Float64[np.ndarray, " k"]
+    t: Float64[np.ndarray, " k"]
+    p_two_sided: Float64[np.ndarray, " k"]
+    p_one_sided: Float64[np.ndarray, " k"]
+    half_t: Float64[np.ndarray, " k"]
+    half_p: Float64[np.ndarray, " k"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,22 +53,37 @@ class Dependence:
     effective_n: float | None
 
 
-def draw(frames: Frames, n: int, rng: np.random.Generator) -> Drawn:
-    """n frames at random without putting back (all, where there are fewer), and their tests."""
-    chosen = rng.permutation(len(frames.before))[:n]
+def draw(frames: Frames, n: int, rng: np.random.Generator, count: int = 1) -> Drawn:
+    """`count` draws of n frames at random without putting back (all, where there are fewer), and their
+    tests."""
+    total = len(frames.before)
+    chosen = chosen_rows(total, n, rng, count)
     before, after = frames.before[chosen], frames.after[chosen]
-    count = len(chosen)
-    spread = _varies(after - before)
+    t, _ = _t(after - before, 0.0)
+    half_t, df = _t(after, 0.5)
     return Drawn(
-        n=count,
-        before=float(before.mean()),
-        before_sd=_sd(before),
-        after=float(after.mean()),
-        after_sd=_sd(after),
-        two_sided=paired_t(before, after) if spread else None,
-        one_sided=paired_t(before, after, "greater") if spread else None,
-        half=one_sample_t(float(after.mean()), _sd(after), count, 0.5) if _varies(after) else None,
+        n=chosen.shape[1],
+        before=before.mean(axis=1), before_sd=_sd(before), after=after.mean(axis=1), after_sd=_sd(after),
+        t=t, p_two_sided=2.0 * stdtr(df, -np.abs(t)), p_one_sided=stdtr(df, -t),
+        half_t=half_t, half_p=stdtr(df, -half_t),
+    )  # fmt: skip
+
+
+def chosen_rows(total: int, n: int, rng: np.random.Generator, count: int) -> Int64[np.ndarray, "k n"]:
+    """Rows of `count` draws without putting back."""
+    return np.argsort(rng.random((count, total)), axis=1)[:, :n].astype(np.int64)
+
+
+def _t(values: Float64[np.ndarray, "k n"], against: float) -> tuple[Float64[np.ndarray, " k"], int]:
+    """Student's t of the mean of every row, where the row varies by more than rounding, and its degrees of
+    freedom."""
+    n = values.shape[1]
+    sd = (
+        np.where(np.ptp(values, axis=1) > ROUNDING, _sd(values), np.nan)
+        if n > 1
+        else np.full(len(values), np.nan)
     )
+    return (values.mean(axis=1) - against) / (sd / np.sqrt(n)), max(n - 1, 1)
 
 
 def dependence(frames: Frames, n: int) -> Dependence:
@@ -95,11 +113,5 @@ def intra_class(values: Float64[np.ndarray, " n"], group: Int64[np.ndarray, " n"
     return (between - within) / total if total > 0.0 else None
 
 
-def _varies(values: Float64[np.ndarray, " n"]) -> bool:
-    """More than rounding does."""
-    return len(values) > 1 and float(np.ptp(values)) > 1e-12
-
-
-def _sd(values: Float64[np.ndarray, " n"] | Sequence[float]) -> float:
-    array = np.asarray(values)
-    return float(array.std(ddof=1)) if len(array) > 1 else 0.0
+def _sd(values: Float64[np.ndarray, "k n"]) -> Float64[np.ndarray, " k"]:
+    return values.std(axis=1, ddof=1) if values.shape[1] > 1 else np.zeros(len(values))

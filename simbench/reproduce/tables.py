@@ -11,13 +11,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float64
 
 from simbench.paper import PaperMae, PaperTpr
 from simbench.reproduce.collect import Run
-from simbench.reproduce.protocol import Dependence, Drawn, Frames, dependence, draw
+from simbench.reproduce.protocol import Dependence, Drawn, Frames, chosen_rows, dependence, draw
 from simbench.score.statistics import Paired, Summary, paired, summarize
 
 DRAWS = 1000
+COLUMNS = (
+    "before", "before_sd", "after", "after_sd", "t", "p_two_sided", "p_one_sided", "half_t", "half_p",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,13 +80,12 @@ def tpr_table(
     frames = frames_of(before, after)
     if not len(frames.before):
         raise ValueError("no pair of a sweep and a camera is eligible")
-    draws = [draw(frames, printed.n, rng) for _ in range(DRAWS)]
     one, two = _by_seed(before, "tpr"), _by_seed(after, "tpr")
     return TprTable(
         printed=printed,
         pairs=len(frames.before),
         runs=len(two),
-        drawn=_drawn(draws),
+        drawn=_drawn(draw(frames, printed.n, rng, DRAWS)),
         dependence=dependence(frames, printed.n),
         before=summarize(one, rng),
         after=summarize(two, rng),
@@ -96,7 +99,7 @@ def mae_table(printed: PaperMae, runs: Sequence[Run], rng: np.random.Generator) 
         float(np.abs(frame.gnss_m).mean()) for run in runs for frame in run.frames if frame.gnss_m is not None
     ]
     values = np.array(errors, dtype=np.float64)
-    means = [float(rng.permutation(values)[: printed.n].mean()) for _ in range(DRAWS)] if errors else []
+    means = values[chosen_rows(len(values), printed.n, rng, DRAWS)].mean(axis=1) if errors else values
     number = dict(enumerate(runs))
     return MaeTable(
         printed=printed,
@@ -125,24 +128,14 @@ def _by_seed(runs: Sequence[Run], metric: str) -> dict[int, float | None]:
     return {run.seed: run.metrics.get(metric) for run in runs}
 
 
-def _drawn(draws: Sequence[Drawn]) -> dict[str, Spread]:
-    columns = {
-        "before": [d.before for d in draws],
-        "before_sd": [d.before_sd for d in draws],
-        "after": [d.after for d in draws],
-        "after_sd": [d.after_sd for d in draws],
-        "t": [d.two_sided.t for d in draws if d.two_sided],
-        "p_two_sided": [d.two_sided.p for d in draws if d.two_sided],
-        "p_one_sided": [d.one_sided.p for d in draws if d.one_sided],
-        "half_t": [d.half.t for d in draws if d.half],
-        "half_p": [d.half.p for d in draws if d.half],
-    }
-    found = {name: _spread(values) for name, values in columns.items()}
+def _drawn(drawn: Drawn) -> dict[str, Spread]:
+    columns = {name: getattr(drawn, name) for name in COLUMNS}
+    found = {name: _spread(values[np.isfinite(values)]) for name, values in columns.items()}
     return {name: spread for name, spread in found.items() if spread is not None}
 
 
-def _spread(values: Sequence[float]) -> Spread | None:
-    if not values:
+def _spread(values: Float64[np.ndarray, " n"]) -> Spread | None:
+    if not len(values):
         return None
     low, median, high = np.percentile(values, [2.5, 50.0, 97.5])
     return Spread(median=float(median), low=float(low), high=float(high), n=len(values))

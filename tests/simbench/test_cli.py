@@ -24,9 +24,11 @@ from scenarios.load import load_scenario
 from simbench.case import Job
 from simbench.cli import main
 from simbench.learn import resize
+from simbench.reproduce.plan import Size
 from simbench.stage import Stage, stage
 from simbench.suite.side import write_side
 from tests.simbench.cheats import named
+from tests.simbench.reproduce.made_up import made_up_row
 from tests.simbench.suite.sides import runs, side
 from tests.simbench.support import staged, write_scenario
 
@@ -128,7 +130,10 @@ def test_every_verb_has_an_example_that_runs(
         systems[system] = systems[system].model_copy(update={"duration_s": 0.8})  # type: ignore[index]
         return changed.model_copy(update={"systems": systems})
 
+    tiny = Size(name="quick", seeds=1, boards=1, variants=1, groups=1, map=1, strips=1, fit_points=0)
     with (
+        mock.patch("simbench.reproduce.plan.QUICK", tiny),
+        mock.patch("simbench.reproduce.campaign.row_of", made_up_row),
         mock.patch("simbench.learn.resize", shortened),
         mock.patch("simbench.learn.SCENARIOS", (("overtake-recede", "car"),)),
     ):

@@ -3,14 +3,17 @@ has numbers that are known beforehand."""
 
 from __future__ import annotations
 
+import json
+from dataclasses import asdict
+
 import numpy as np
 
 from simbench.case import ORACLE
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import BASELINE, GROUND, METHOD, OURS
-from simbench.reproduce.collect import Board, FrameValue, PairValue, Run
+from simbench.reproduce.collect import Board, FrameValue, PairValue, Run, text_of
 from simbench.reproduce.levels import GROUPS, LEVELS
-from simbench.reproduce.plan import Ask, Size, asks, board_asks, fit_points
+from simbench.reproduce.plan import Ask, BoardAsk, Size, asks, board_asks, fit_points
 from simbench.score.metrics import METRICS
 
 SMALL = Size(
@@ -42,15 +45,26 @@ def damage(ask: Ask) -> float:
     return 0.8
 
 
+def made_up_row(ask: Ask | BoardAsk) -> str:
+    """What `collect.row_of` gives, of a run that was not made."""
+    if isinstance(ask, BoardAsk):
+        return json.dumps([asdict(board) for board in _boards(ask)])
+    rng = np.random.Generator(np.random.PCG64(ask.job.seed))
+    return text_of([_run(ask, name, rng) for name in (*ask.job.pipelines, ORACLE)])
+
+
+def _boards(ask: BoardAsk) -> list[Board]:
+    return [
+        Board(system=ask.system, camera=f"cam-{i}", seed=ask.seed, tpr=0.9 + 0.01 * i, tpr_true=0.95)
+        for i in range(3)
+    ]
+
+
 def made_up(size: Size = SMALL, seed: int = 0) -> Found:
     """All runs of a size."""
     rng = np.random.Generator(np.random.PCG64(seed))
     runs = {ask: tuple(_run(ask, name, rng) for name in (*ask.job.pipelines, ORACLE)) for ask in asks(size)}
-    boards = tuple(
-        Board(system=ask.system, camera=f"cam-{i}", seed=ask.seed, tpr=0.9 + 0.01 * i, tpr_true=0.95)
-        for ask in board_asks(size)
-        for i in range(3)
-    )
+    boards = tuple(board for ask in board_asks(size) for board in _boards(ask))
     return Found(size=size, runs=runs, boards=boards, failures=())
 
 
