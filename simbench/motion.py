@@ -149,8 +149,12 @@ class Motion:
 
     def object_centre(self, object_id: int, t_ns: Int64[np.ndarray, " n"]) -> Poses:
         """T_world_box: centre and axes of the object's rest-pose box."""
-        rotation, position = self.object_root(object_id, t_ns)
-        return rotation, position + rotation @ self.world.box_centre_m[object_id]
+        moves = object_id in self.world.actor_of_object
+        rotation, position = self.object_root(object_id, t_ns if moves else t_ns[:1])
+        centre = position + rotation @ self.world.box_centre_m[object_id]
+        if moves:
+            return rotation, centre
+        return np.broadcast_to(rotation, (len(t_ns), 3, 3)), np.broadcast_to(centre, (len(t_ns), 3))
 
     def poses(
         self, t_ns: Int64[np.ndarray, " n"]

@@ -58,9 +58,7 @@ class LogWriter:
         from mcap.writer import CompressionType, Writer
 
         self._file = path.open("wb")
-        self._writer = Writer(
-            self._file, chunk_size=chunk_bytes, compression=CompressionType.LZ4, enable_data_crcs=True
-        )
+        self._writer = Writer(self._file, chunk_size=chunk_bytes, compression=CompressionType.LZ4)
         self._writer.start(profile="", library=LIBRARY)
         self._encoding, self._describe = encoding, describe
         self._channels: dict[str, int] = {}

@@ -89,7 +89,7 @@ def read_records(
 
 class _Reading:
     """What is known of a file of `size` bytes while it is read. bytes_left: that may still be unpacked;
-    records_left: that may still be met in chunks."""
+    records_left: that may still be met in chunks. found: messages so far."""
 
     def __init__(self, *, name: str, checked: bool, most: int, size: int, growth: int) -> None:
         self.name, self.checked, self.most, self.growth = name, checked, most, growth
@@ -97,10 +97,11 @@ class _Reading:
         self.records_left = FREE_RECORDS + size // BYTES_A_RECORD
         self.channels: dict[int, Channel] = {}
         self.schemas: dict[int, Schema] = {}
+        self.found = 0
         self.ended = False
 
     def records(self, file: _Bounded, size: int) -> Iterator[Found | Metadata]:
-        from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema
+        from mcap.records import Channel, Chunk, Footer, Message, Metadata, Schema, Statistics
         from mcap.stream_reader import StreamReader
 
         most = max(size, 2 * self.most)  # what is longer is no record; what only ends too late is cut off
@@ -121,6 +122,10 @@ class _Reading:
                 self.schemas[record.id] = record
             elif isinstance(record, Metadata):
                 yield record
+            elif isinstance(record, Statistics):
+                if self.checked and record.message_count != self.found:  # a chunk was passed over
+                    counts = f"holds {self.found} messages, and counts {record.message_count}"
+                    raise BadInput(f"is damaged: {counts}", file=self.name)
             elif isinstance(record, Chunk):
                 yield from self._messages(self._unpacked(record))
 
@@ -154,6 +159,7 @@ class _Reading:
     def _found(self, channel: int, sequence: int, log_ns: int, publish_ns: int, data: bytes) -> Found:
         known = self.channels[channel]
         schema = self.schemas[known.schema_id] if known.schema_id else None
+        self.found += 1
         return Found(
             channel=known, schema=schema, sequence=sequence, log_ns=log_ns, publish_ns=publish_ns, data=data
         )

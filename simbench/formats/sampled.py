@@ -95,7 +95,7 @@ def _kept(
     rotation: Float64[np.ndarray, "k 3 3"],
     position: Float64[np.ndarray, "k 3"],
 ) -> Samples:
-    still = bool((rotation == rotation[:1]).all() and (position == position[:1]).all())
+    still = all(bool((pose[1:] == pose[:-1]).all()) for pose in (rotation, position))
     rows = np.array([0, -1]) if still else slice(None)
     return Samples(t_ns=t_ns[rows], rotation=rotation[rows], translation_m=position[rows])
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
@@ -114,8 +115,10 @@ def write_recording(
     begun = Manifest(complete=False, simbench=version("simbench"), source=source, injected=injected)
     _write_manifest(begun, folder)
     try:
-        messages = _write(folder / MESSAGES, _messages(recording, as_png))
-        truth = _write(folder / TRUTH, _truth(recording))
+        with ThreadPoolExecutor(max_workers=1) as beside:  # hashes and checksums release the interpreter
+            really = beside.submit(_write, folder / TRUTH, _truth(recording))
+            messages = _write(folder / MESSAGES, _messages(recording, as_png))
+            truth = really.result()
     except OSError as error:
         raise BadInput(f"cannot be written: {error.strerror or error}", file=str(folder)) from error
     done = begun.model_copy(update={"complete": True, "messages": messages, "truth": truth})

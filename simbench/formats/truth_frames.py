@@ -76,12 +76,12 @@ def read_truth(frames: Iterator[Frame]) -> Truth:
 
 
 def _span(truth: Truth) -> tuple[int, int]:
-    times = [scan.fire_ns for scan in truth.scans if len(scan.fire_ns)]
+    times = [scan.fire_ns for scan in truth.scans]
     times += [np.array([image.capture_ns for image in truth.images], dtype=np.int64)]
     if truth.reference is not None:
         times += [truth.reference.fix_ns, truth.reference.available_ns]
-    every = np.concatenate([np.asarray(t, dtype=np.int64) for t in times])
-    return (int(every.min()), int(every.max())) if len(every) else (0, 0)
+    ends = [(int(t.min()), int(t.max())) for t in times if len(t)]
+    return (min(first for first, _ in ends), max(last for _, last in ends)) if ends else (0, 0)
 
 
 def _about(truth: Truth) -> Frame:

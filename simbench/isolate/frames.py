@@ -62,11 +62,14 @@ def pieces(frame: Frame) -> list[bytes | memoryview]:
     """The bytes of a frame, without a copy of its arrays. FrameError as above."""
     specs, body = [], list[memoryview]()
     for name, array in frame.arrays.items():
-        little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
+        little = array
+        if array.dtype not in _NAMES or not array.flags.c_contiguous:
+            little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
         if little.dtype not in _NAMES:
             raise FrameError(f"'{name}' holds {array.dtype}, which no frame can carry")
-        specs.append({"name": name, "dtype": _NAMES[little.dtype], "shape": list(array.shape)})
-        body.append(little.reshape(-1).view(np.uint8).data)
+        specs.append({"name": name, "dtype": _NAMES[little.dtype], "shape": array.shape})
+        if array.size:
+            body.append(little.data.cast("B"))
     try:
         text = json.dumps({"kind": frame.kind, **frame.fields, "arrays": specs}, allow_nan=False)
     except (ValueError, TypeError) as error:

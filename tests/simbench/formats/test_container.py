@@ -18,6 +18,7 @@ from mcap.reader import make_reader
 
 from scenarios.errors import BadInput
 from simbench.formats.container import CutOff, Entry, LogWriter, read_log
+from simbench.formats.mcap_records import MAGIC
 
 ENCODING = "test/1"
 ROOT = Path(__file__).parents[3]
@@ -74,6 +75,21 @@ def test_a_writer_that_never_ended_leaves_its_whole_chunks(tmp_path: Path) -> No
     found, error = read(tmp_path / "a.mcap")
     assert isinstance(error, CutOff)
     assert found == entries()[: len(found)] and 45 < len(found) < 60
+
+
+def test_a_chunk_that_is_called_something_else_is_missed(tmp_path: Path) -> None:
+    """Readers skip records that they do not know; the file's own count of its messages tells of it."""
+    whole = bytearray(write(tmp_path / "a.mcap", entries()))
+    at, chunks = len(MAGIC), []
+    while at + 9 < len(whole) - len(MAGIC):
+        code, length = struct.unpack_from("<BQ", whole, at)
+        chunks += [at] if code == 6 else []
+        at += 9 + length
+    whole[chunks[-1]] = 0x80  # of private use
+    (tmp_path / "b.mcap").write_bytes(whole)
+    found, error = read(tmp_path / "b.mcap")
+    assert found == entries()[: len(found)] and len(found) < 60
+    assert error is not None and f"holds {len(found)} messages, and counts 60" in str(error)
 
 
 WRITER = """
