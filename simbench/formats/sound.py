@@ -3,11 +3,17 @@
 Every frame may be well made and the whole still be nonsense: a point that is no number, a sweep without
 truth, a target that is no object. Then scores would end in a crash, or in a number. Here it ends in one
 sentence. What the bench records, under any fault, passes.
+
+Everything is looked at as it is read. What is kept until all was, to see whether it fits (`Heard`, and
+`Outline` of the truth), does not grow with points or pixels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -29,29 +35,62 @@ from simbench.formats.sound_calibration import (
     is_name,
     is_sensor,
 )
-from simbench.formats.sound_truth import faults_of_match, faults_of_truth
-from simbench.recording import Recording
 
 MOST_TRACK = 2**62
 
 
-def check_sound(recording: Recording, *, whole: bool, messages_file: str, truth_file: str) -> None:
-    """BadInput: the recording cannot be. whole: nothing of it is missing; else the truth may end early."""
-    told = (recording.calibration, recording.categories, recording.messages)
-    for file, faults in (
-        (messages_file, faults_of_messages(*told)),
-        (truth_file, faults_of_truth(recording.truth, whole=whole)),
-        (truth_file, faults_of_match(recording, whole=whole)),
-    ):
-        for fault in faults:
-            raise BadInput(fault, file=file)
+@dataclass(frozen=True, kw_only=True)
+class Heard:
+    """What the truth must fit, of a sweep, an image or its boxes. count: of points or boxes; last_ns: of the
+    last firing, by the stamp."""
+
+    kind: type
+    sensor: str
+    seq: int
+    stamp_ns: int
+    last_ns: int
+    count: int
 
 
-def faults_of_messages(
-    calibration: Calibration, categories: Mapping[str, CategorySize], messages: tuple[Measurement, ...]
-) -> Iterator[str]:
-    """What is wrong with that which a pipeline is told, in sentences without an end."""
-    yield from faults_of_calibration(calibration)
+def sound_messages(
+    calibration: Calibration,
+    categories: Mapping[str, CategorySize],
+    messages: Iterable[Measurement],
+    heard: list[Heard],
+    file: str,
+) -> Iterator[Measurement]:
+    """The messages one by one, each when it is known to be sound; what is kept of them is added to `heard`.
+    BadInput: one cannot be, or the calibration or a category."""
+    for fault in chain(faults_of_calibration(calibration), _faults_of_categories(categories)):
+        raise BadInput(fault, file=file)
+    before_ns = -LATEST_NS
+    known: dict[tuple[type, str, int], bytes] = {}
+    for number, message in enumerate(messages):
+        where = f"message {number} ({type(message).__name__} {message.seq} of {show(message.sensor)})"
+        for fault in chain(_faults_of_stamps(message, before_ns), _faults_of(message, calibration)):
+            raise BadInput(f"{where}: {fault}", file=file)
+        content = _content(message)
+        if known.setdefault((type(message), message.sensor, message.seq), content) != content:
+            raise BadInput(f"{where}: another one has its number", file=file)
+        before_ns = message.arrival_ns
+        if not isinstance(message, EgoMotion):
+            heard.append(_heard(message))
+        yield message
+
+
+def _heard(message: LidarScan | CameraImage | Detections) -> Heard:
+    count, last_ns = 0, message.stamp_ns
+    if isinstance(message, LidarScan):
+        count, last_ns = len(message.xyz_m), last_ns + int(message.offset_ns.max(initial=0))
+    elif isinstance(message, Detections):
+        count = len(message.boxes)
+    return Heard(
+        kind=type(message), sensor=message.sensor, seq=message.seq, stamp_ns=message.stamp_ns,
+        last_ns=last_ns, count=count,
+    )  # fmt: skip
+
+
+def _faults_of_categories(categories: Mapping[str, CategorySize]) -> Iterator[str]:
     for name, size in categories.items():
         if not is_name(name):
             yield f"a category is called {show(name)}"
@@ -60,24 +99,17 @@ def faults_of_messages(
             or not 0.0 <= size.spread < FARTHEST_M
         ):
             yield f"the category {show(name)} has a size that is none"
-    before_ns = -LATEST_NS
-    first: dict[tuple[str, str, int], Measurement] = {}
-    for number, message in enumerate(messages):
-        where = f"message {number} ({type(message).__name__} {message.seq} of {show(message.sensor)})"
-        if not is_sensor(message.sensor):
-            yield f"{where}: its sensor's name is none"
-        if message.seq < 0:
-            yield f"{where}: its number is negative"
-        if max(abs(message.stamp_ns), abs(message.arrival_ns)) >= LATEST_NS:
-            yield f"{where}: its time lies beyond {LATEST_NS} ns"
-        if message.arrival_ns < before_ns:
-            yield f"{where}: it arrived before the one that stands before it"
-        before_ns = message.arrival_ns
-        for fault in _faults_of(message, calibration):
-            yield f"{where}: {fault}"
-        known = first.setdefault((type(message).__name__, message.sensor, message.seq), message)
-        if known is not message and not _same(known, message):
-            yield f"{where}: another one has its number"
+
+
+def _faults_of_stamps(message: Measurement, before_ns: int) -> Iterator[str]:
+    if not is_sensor(message.sensor):
+        yield "its sensor's name is none"
+    if message.seq < 0:
+        yield "its number is negative"
+    if max(abs(message.stamp_ns), abs(message.arrival_ns)) >= LATEST_NS:
+        yield f"its time lies beyond {LATEST_NS} ns"
+    if message.arrival_ns < before_ns:
+        yield "it arrived before the one that stands before it"
 
 
 def _faults_of(message: Measurement, calibration: Calibration) -> Iterator[str]:
@@ -125,14 +157,16 @@ def _faults_of_boxes(detections: Detections) -> Iterator[str]:
             yield f"box {number} is of no track or category"
 
 
-def _same(one: Measurement, other: Measurement) -> bool:
-    """Whether the second is the first, delivered again."""
-    if isinstance(one, Detections) and isinstance(other, Detections):
-        return (one.stamp_ns, one.boxes) == (other.stamp_ns, other.boxes)
+def _content(message: Measurement) -> bytes:
+    """A hash of all but the arrival: what is delivered again has the same."""
+    hashed = hashlib.sha256(str(message.stamp_ns).encode())
+    if isinstance(message, Detections):
+        hashed.update(repr(message.boxes).encode())
+        return hashed.digest()
     names = {
         LidarScan: ("xyz_m", "intensity", "offset_ns", "ring"), CameraImage: ("rgb",),
         EgoMotion: ("velocity_mps", "rate_radps", "specific_force_mps2"),
-    }[type(one)]  # fmt: skip
-    return one.stamp_ns == other.stamp_ns and all(
-        np.array_equal(getattr(one, name), getattr(other, name)) for name in names
-    )
+    }[type(message)]  # fmt: skip
+    for name in names:
+        hashed.update(getattr(message, name).tobytes())
+    return hashed.digest()

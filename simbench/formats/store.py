@@ -14,31 +14,32 @@ import json
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import chain, zip_longest
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, TypeAdapter
 
-from fusion.messages import CameraImage, LidarScan, Measurement
+from fusion.messages import CameraImage, LidarScan
 from scenarios.errors import BadInput, Where
 from scenarios.scenario import Spec
 from scenarios.validate import validate
 from simbench.faults.receipt import Receipt
 from simbench.files import prepare_folder, read_plain, write_text
 from simbench.formats.container import LogWriter
-from simbench.formats.picture_frames import PICTURE, Album, AsPng, picture_frame
+from simbench.formats.picture_frames import AsPng, picture_frame
 from simbench.formats.png import encode
-from simbench.formats.sound import check_sound
-from simbench.formats.stored_frames import ENCODING, MANIFEST, Part, Word, frames_of
-from simbench.formats.truth_frames import read_truth, truth_frames
-from simbench.isolate.frames import Frame, FrameError, pack, pieces
-from simbench.isolate.told import message_frame, read_message, read_reset, reset_frame
+from simbench.formats.reading import Reading, read_parts, read_told
+from simbench.formats.stored_frames import ENCODING, MANIFEST, Part, Word
+from simbench.formats.truth_frames import truth_frames
+from simbench.formats.truth_parts import truth_of
+from simbench.isolate.frames import Frame, pack, pieces
+from simbench.isolate.told import message_frame, reset_frame
 from simbench.recording import Recording
 
 __all__ = [
     "MANIFEST", "MESSAGES", "NOTHING", "TRUTH", "Injected", "Manifest", "Part", "Source", "Stored",
-    "first_difference", "read_manifest", "read_recording", "write_recording",
+    "check_recording", "first_difference", "read_manifest", "read_recording", "write_recording",
 ]  # fmt: skip
 
 SCHEMA = "simbench-recording/1"
@@ -126,33 +127,35 @@ def write_recording(
     return done
 
 
-def read_recording(folder: Path) -> Stored:
-    """A recording from its folder. One that was cut off is read up to there, and `missing` says so. BadInput:
-    there is none, what is there is damaged, or it cannot be (`sound.py`)."""
+def read_recording(folder: Path, *, images: bool = True) -> Stored:
+    """A recording from its folder. One that was cut off is read up to there, and `missing` says so. images:
+    False leaves pictures out, once they are checked. BadInput: there is no recording, what is there is
+    damaged, or it cannot be (`sound.py`)."""
+    manifest, reading = _opened(folder)
+    calibration, categories, messages = read_told(reading)
+    told = tuple(one for one in messages if images or not isinstance(one, CameraImage))
+    recording = Recording(
+        calibration=calibration, categories=categories, messages=told, truth=truth_of(read_parts(reading))
+    )
+    return Stored(manifest=manifest, recording=recording, missing=tuple(reading.missing))
+
+
+def check_recording(folder: Path) -> tuple[Manifest, tuple[str, ...]]:
+    """What a folder's recording says of itself, and what of it is missing: all of `read_recording` but the
+    recording, of which one message at a time is held. BadInput as there."""
+    manifest, reading = _opened(folder)
+    for _ in chain(read_told(reading)[2], read_parts(reading)):
+        pass
+    return manifest, tuple(reading.missing)
+
+
+def _opened(folder: Path) -> tuple[Manifest, Reading]:
     manifest = read_manifest(folder)
     missing = [] if manifest.complete else ["recording.json: writing was not completed"]
-    frames = frames_of(folder / MESSAGES, manifest.messages, missing)
-    first, pictures = next(frames, None), Album()
-    if first is None or first.kind != "reset":
-        wrong = "is cut off before its calibration" if first is None else "does not begin with a calibration"
-        raise BadInput(wrong, file=str(folder / MESSAGES))
-    try:
-        calibration, categories = read_reset(first)
-        told = tuple(_message(frame, pictures) for frame in frames)
-    except FrameError as error:
-        raise BadInput(f"is malformed: {error}", file=str(folder / MESSAGES)) from None
-    before = len(missing)
-    try:
-        really = read_truth(frames_of(folder / TRUTH, manifest.truth, missing))
-    except FrameError as error:
-        if missing[before:]:
-            raise BadInput("is cut off before its poses", file=str(folder / TRUTH)) from None
-        raise BadInput(f"is malformed: {error}", file=str(folder / TRUTH)) from None
-    recording = Recording(calibration=calibration, categories=categories, messages=told, truth=really)
-    check_sound(
-        recording, whole=not missing, messages_file=str(folder / MESSAGES), truth_file=str(folder / TRUTH)
-    )
-    return Stored(manifest=manifest, recording=recording, missing=tuple(missing))
+    return manifest, Reading(
+        messages=folder / MESSAGES, truth=folder / TRUTH, parts=(manifest.messages, manifest.truth),
+        missing=missing,
+    )  # fmt: skip
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -189,10 +192,6 @@ def _messages(recording: Recording, as_png: AsPng = encode) -> Iterator[tuple[st
         else:
             frame = message_frame(message)
         yield f"/{message.sensor}/{frame.kind}", message.arrival_ns, message.stamp_ns, frame
-
-
-def _message(frame: Frame, pictures: Album) -> Measurement:
-    return pictures.read(frame) if frame.kind == PICTURE else read_message(frame)
 
 
 def _truth(recording: Recording) -> Iterator[tuple[str, int, int, Frame]]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path, PurePath
 
-from fusion.messages import CameraImage, LidarScan
+from fusion.messages import LidarScan
 from scenarios.errors import BadInput, Where
 from scenarios.fault_set import FaultSet, fault_set, parse_specs
 from simbench.case import Job
@@ -45,11 +45,8 @@ def play_stored(job: Job, *, images: bool) -> Recorded:
     """The recording of a job, its pictures too where a pipeline wants them. BadInput: none is there, or it
     is damaged."""
     folder = folder_of(job)
-    stored = read_recording(folder)
+    stored = read_recording(folder, images=images)
     recording = stored.recording
-    if not images:
-        kept = tuple(m for m in recording.messages if not isinstance(m, CameraImage))
-        recording = replace(recording, messages=kept)
     injected = stored.manifest.injected
     return Recorded(
         scene=scene_of(stored.manifest, recording), faults=faults_of(stored.manifest, folder),

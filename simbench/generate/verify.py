@@ -6,7 +6,7 @@ from pathlib import Path
 
 from scenarios.errors import BadInput
 from scenarios.load import list_scenarios
-from simbench.formats.store import first_difference, read_recording
+from simbench.formats.store import check_recording, first_difference, read_recording
 from simbench.generate.work import job_of
 from simbench.run import recording_of
 
@@ -21,16 +21,15 @@ def _check_scenario(scenario: str, folder: Path) -> None:
 
 def verified(folder: Path, *, rerun: bool) -> tuple[str, bool]:
     """A sentence, and whether all is well. BadInput: no recording lies there, or it is damaged."""
-    stored = read_recording(folder)
-    if stored.missing:
-        return f"{folder}: INCOMPLETE: {'; '.join(stored.missing)}", False
-    part = stored.manifest.messages
-    count = 0 if part is None else part.count
+    manifest, missing = check_recording(folder)
+    if missing:
+        return f"{folder}: INCOMPLETE: {'; '.join(missing)}", False
+    count = 0 if manifest.messages is None else manifest.messages.count
     if not rerun:
         return f"{folder}: complete, {count} messages, all hashes right", True
-    _check_scenario(stored.manifest.source.scenario, folder)
-    again = recording_of(job_of(stored.manifest.source))[2].recording
-    where = first_difference(stored.recording, again)
+    _check_scenario(manifest.source.scenario, folder)
+    again = recording_of(job_of(manifest.source))[2].recording
+    where = first_difference(read_recording(folder).recording, again)
     if where is not None:
         return f"{folder}: not the same when it is made again: {where}", False
     return f"{folder}: complete, {count} messages, the same bytes when made again", True
