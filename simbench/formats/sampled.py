@@ -6,7 +6,7 @@ by a dt^2 / 8: about a micrometre at 10 m/s^2.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,13 +65,16 @@ class SampledPoses:
 
 def sampled(
     poses: PoseSource, object_ids: Iterable[int], sensors: Iterable[str], true_ns: Span, asked_ns: Span
-) -> dict[str, Samples]:
-    """Everything from before the first to after the last time. What stands still has two samples. true_ns:
-    when something was measured; asked_ns: also what stamps claim: there scores ask for ego and objects."""
+) -> Iterator[tuple[str, Samples]]:
+    """Every body and its samples, from before the first to after the last time; what stands still has two.
+    true_ns: when something was measured; asked_ns: also what stamps claim: there scores ask for ego and
+    objects."""
     t_ns, t_asked_ns = _steps(true_ns), _steps(asked_ns)
-    found = {EGO: _kept(t_asked_ns, *poses.ego(t_asked_ns))}
-    found |= {object_name(i): _kept(t_asked_ns, *poses.object_centre(i, t_asked_ns)) for i in object_ids}
-    return found | {sensor_name(name): _kept(t_ns, *poses.sensor(name, t_ns)) for name in sensors}
+    yield EGO, _kept(t_asked_ns, *poses.ego(t_asked_ns))
+    for i in object_ids:
+        yield object_name(i), _kept(t_asked_ns, *poses.object_centre(i, t_asked_ns))
+    for name in sensors:
+        yield sensor_name(name), _kept(t_ns, *poses.sensor(name, t_ns))
 
 
 def _steps(span_ns: Span) -> Int64[np.ndarray, " k"]:

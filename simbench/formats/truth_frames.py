@@ -25,13 +25,15 @@ def truth_frames(truth: Truth, claimed_ns: Sequence[int] = ()) -> Iterator[tuple
     yield "/truth/calibration", first_ns, reset_frame(truth.calibration, {})
     ids = [info.object_id for info in truth.objects]
     sensors = truth.calibration.T_ego_sensor
-    for body, samples in sampled(truth.poses, ids, sensors, (first_ns, last_ns), asked_ns).items():
+    for body, samples in sampled(truth.poses, ids, sensors, (first_ns, last_ns), asked_ns):
         yield "/truth/poses", first_ns, _poses(body, samples)
     if truth.reference is not None:
         yield "/truth/reference", first_ns, _reference(truth.reference)
-    timed = [(int(s.fire_ns.min()) if len(s.fire_ns) else first_ns, _scan(s)) for s in truth.scans]
-    timed += [(image.capture_ns, _image(image)) for image in truth.images]
-    for t_ns, frame in sorted(timed, key=lambda item: item[0]):
+    timed: list[tuple[int, ScanTruth | ImageTruth]]
+    timed = [(int(s.fire_ns.min()) if len(s.fire_ns) else first_ns, s) for s in truth.scans]
+    timed += [(image.capture_ns, image) for image in truth.images]
+    for t_ns, part in sorted(timed, key=lambda item: item[0]):
+        frame = _scan(part) if isinstance(part, ScanTruth) else _image(part)
         yield f"/truth/{frame.kind.removesuffix('_truth')}/{frame.fields['sensor']}", t_ns, frame
 
 

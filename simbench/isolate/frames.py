@@ -15,6 +15,7 @@ import math
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -67,16 +68,22 @@ def pieces(frame: Frame) -> list[bytes | memoryview]:
             little = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<"))
         if little.dtype not in _NAMES:
             raise FrameError(f"'{name}' holds {array.dtype}, which no frame can carry")
-        specs.append({"name": name, "dtype": _NAMES[little.dtype], "shape": array.shape})
+        specs.append(_spec_text(name, _NAMES[little.dtype], array.shape))
         if array.size:
             body.append(little.data.cast("B"))
     try:
-        text = json.dumps({"kind": frame.kind, **frame.fields, "arrays": specs}, allow_nan=False)
+        text = json.dumps({"kind": frame.kind, **frame.fields}, allow_nan=False)
     except (ValueError, TypeError) as error:
         raise FrameError(f"a '{frame.kind}' cannot be written as JSON: {error}") from error
-    header, size = text.encode("utf-8"), sum(piece.nbytes for piece in body)
+    header = f'{text[:-1]}, "arrays": [{", ".join(specs)}]}}'.encode()
+    size = sum(piece.nbytes for piece in body)
     check_sizes(len(header), size)
     return [HEAD.pack(MAGIC, len(header), size) + header, *body]
+
+
+@lru_cache(maxsize=4096)  # they repeat from frame to frame
+def _spec_text(name: str, dtype: str, shape: tuple[int, ...]) -> str:
+    return json.dumps({"name": name, "dtype": dtype, "shape": shape})
 
 
 def sizes(head: bytes) -> tuple[int, int]:
