@@ -32,7 +32,7 @@ def changes(found: Found, rng: np.random.Generator) -> tuple[Changed, ...]:
     """By variant and cell; last the method without its smoother, whose positions are scored anyway."""
     rows = []
     for name in NAMES:
-        variant = variant_of(name)
+        variant = variant_of(reference_of(name))
         for cell in CELLS:
             before = found.of("variants", cell.name, METHOD)
             after = found.of("variants", cell.name, reference_of(name))
