@@ -263,27 +263,31 @@ def _predictions(
     found: Found, system: str, baseline: str, posterior: Posterior,
     emulator: Callable[[Float64[np.ndarray, " n"]], Emulator], cells: Sequence[Cell],
 ) -> tuple[Predicted, ...]:  # fmt: skip
-    count, rows = found.size.fit_points, list[Predicted]()
+    count, columns = found.size.fit_points, dict[str, tuple[Float64[np.ndarray, " n"], float, float, int]]()
     for cell in cells:
         row = cell.printed
-        columns = {
-            f"{cell.name}: TPR of P-Fusion": (
-                _values(found, cell.name, METHOD, "tpr", count), row.fusion, row.fusion_sd,
-            ),
-            f"{cell.name}: SD of the paired difference": (
-                _gain_sd(found, cell.name, baseline, count), paired_sd(row), 0.0,
-            ),
-            f"{cell.name}: MAE against the held GNSS [m], printed for both scenarios together": (
-                _values(found, cell.name, METHOD, "mae_m.smooth.gnss", count), MAE[system].mean_m,
-                MAE[system].sd_m,
-            ),
-        }  # fmt: skip
-        for what, (values, value, sd) in columns.items():
-            if np.isfinite(values).sum() < LEAST_VALUES:
-                continue  # an emulator of so few would be none: the table then has no such row
-            told = Observed.of([value], passes=PASSES, frame_sd=[sd], frames=[row.n])
-            rows.append(Predicted(what=what, predicted=predictive(posterior, [emulator(values)], told)[0]))
-    return tuple(rows)
+        columns[f"{cell.name}: TPR of P-Fusion"] = (
+            _values(found, cell.name, METHOD, "tpr", count), row.fusion, row.fusion_sd, row.n,
+        )  # fmt: skip
+        columns[f"{cell.name}: SD of the paired difference"] = (
+            _gain_sd(found, cell.name, baseline, count), paired_sd(row), 0.0, row.n,
+        )  # fmt: skip
+    both = [_values(found, cell.name, METHOD, "mae_m.smooth.gnss", count) for cell in cells]
+    mae = MAE[system]
+    columns["both scenarios: MAE against the held GNSS (m)"] = (
+        np.mean(both, axis=0), mae.mean_m, mae.sd_m, mae.n,
+    )  # fmt: skip
+    return tuple(
+        Predicted(
+            what=what,
+            predicted=predictive(
+                posterior, [emulator(values)],
+                Observed.of([value], passes=PASSES, frame_sd=[sd], frames=[n]),
+            )[0],
+        )
+        for what, (values, value, sd, n) in columns.items()
+        if np.isfinite(values).sum() >= LEAST_VALUES  # an emulator of fewer would be none
+    )  # fmt: skip
 
 
 def paired_sd(row: PaperTpr) -> float:
