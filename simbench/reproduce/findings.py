@@ -33,11 +33,14 @@ def findings(told: Answer) -> tuple[Finding, ...]:
     found = [
         Finding(question="Do the tables agree?", says=tuple(_agreement(by_name["reached"]))),
         Finding(question="Does the method help when nothing is wrong?", says=tuple(_help(by_name["none"]))),
-        Finding(
-            question="Which levels of error bring the baseline to the paper's values?",
-            says=tuple(line for fit in told.fits for line in _fit(fit)),
-        ),
     ]
+    if told.fits:
+        found.append(
+            Finding(
+                question="Which levels of error bring the baseline to the paper's values?",
+                says=tuple(line for fit in told.fits for line in _fit(fit)),
+            )
+        )
     if told.strips:
         found += [
             Finding(

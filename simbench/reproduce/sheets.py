@@ -28,13 +28,15 @@ NONE = "–"
 
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """name: of its files. rows: as many words as columns in each."""
+    """name: of its files. rows: as many words as columns in each. texts: how many columns, from the left, are
+    words, not numbers."""
 
     name: str
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = ()
+    texts: int = 1
 
 
 def sheets(told: Answer) -> tuple[Sheet, ...]:
@@ -72,7 +74,7 @@ def table_i(boards: tuple[BoardTable, ...]) -> Sheet:
         )
     values = "; ".join(f"{b.system}: {', '.join(f'{100 * v:g}' for v in b.printed)}" for b in boards)
     return Sheet(
-        name="table-1", title="Table I: TPR (%) of a static board after calibration",
+        texts=2, name="table-1", title="Table I: TPR (%) of a static board after calibration",
         columns=("rig", "camera", "paper", "found calibration", "true calibration", "calibrations"),
         rows=tuple(rows),
         notes=(
@@ -89,6 +91,7 @@ def table_ii(table: ConditionTable) -> Sheet:
         for title, one in (("raw box", cell.raw), ("box without ground", cell.ground)):
             rows.append((cell.cell, title, *_tpr_row(one)))
     return Sheet(
+        texts=2,
         name=f"table-2-{table.condition}",
         title=f"Table II: TPR (%) of the baseline and of P-Fusion; {table.words}",
         columns=(
@@ -209,7 +212,7 @@ def readings(table: ConditionTable) -> Sheet:
     return Sheet(
         name=f"readings-{table.condition}",
         title=f"The measure read otherwise (%), one at a time; {table.words}",
-        columns=("cell", "pipeline", *READINGS),
+        columns=("cell", "pipeline", *READINGS), texts=2,
         rows=tuple(rows),
         notes=(
             "tpr: as everywhere here. nonempty: pairs without points left out. pooled: counts summed first. "
@@ -236,7 +239,7 @@ def steps(told: Answer) -> Sheet:
     return Sheet(
         name="steps", title="One step or reading changed: difference to the method as it is",
         columns=("step", "what", "change", "cell", "TPR (points)", "precision", "recall", "MAE (m)", "runs"),
-        rows=tuple(rows), notes=("Under the errors that reach the paper's first scenario.",),
+        rows=tuple(rows), texts=4, notes=("Under the errors that reach the paper's first scenario.",),
     )  # fmt: skip
 
 
@@ -252,7 +255,7 @@ def mended(told: Answer) -> Sheet:
     ]  # fmt: skip
     return Sheet(
         name="mended", title="Everything at its physical bound, then one thing mended: change of P-Fusion",
-        columns=("cell", "mended", "TPR (points)", "MAE (m)", "runs"), rows=tuple(rows),
+        columns=("cell", "mended", "TPR (points)", "MAE (m)", "runs"), texts=2, rows=tuple(rows),
         notes=("algorithm: robust in place of P-Fusion. MAE: below 0 is better.",),
     )  # fmt: skip
 

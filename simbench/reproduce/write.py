@@ -17,7 +17,7 @@ from simbench.reproduce.cells import CELLS, PIPELINES
 from simbench.reproduce.cost import Cost, cost_of
 from simbench.reproduce.files import as_csv, as_latex
 from simbench.reproduce.findings import as_markdown
-from simbench.reproduce.plan import condition_faults
+from simbench.reproduce.plan import Size, condition_faults
 from simbench.reproduce.sheets import sheets
 from simbench.reproduce.variants import NAMES, reference_of
 from simbench.run import recording_of
@@ -35,14 +35,15 @@ def write_answer(told: Answer, out: Path, images: Images) -> Path:
     for sheet in found:
         write_text(out / TABLES / f"{sheet.name}.csv", as_csv(sheet))
         write_text(out / TABLES / f"{sheet.name}.tex", as_latex(sheet))
-    costs = measured_costs()
+    costs = measured_costs(told.size)
     write_text(out / COSTS, json.dumps({name: asdict(cost) for name, cost in costs.items()}, indent=1) + "\n")
     return write_page(told, found, draw_paper(out, images), costs, out, command=command)
 
 
-def measured_costs() -> Mapping[str, Cost]:
-    """Of every pipeline and variant, on one drive."""
+def measured_costs(size: Size) -> Mapping[str, Cost]:
+    """Of every pipeline, on one drive; of every variant where all is run."""
     cell = CELLS[0]
     recording = recording_of(cell.job(0, condition_faults(cell, "reached"), ()))[2].recording
-    names = (*PIPELINES, *(reference_of(name) for name in NAMES))
+    variants = NAMES if size.name == "full" else ()
+    names = (*PIPELINES, *(reference_of(name) for name in variants))
     return {name: cost_of(name, recording) for name in names}
