@@ -72,12 +72,13 @@ def test_mending_a_group_gives_back_its_share_and_the_algorithm_the_difference(t
             assert gained == pytest.approx(LOSS[METHOD] / len(GROUPS), abs=0.05)
 
 
-def test_a_cell_above_what_any_level_gives_is_out_of_reach_and_a_conflict(told: Answer) -> None:
+def test_a_cell_above_what_any_level_gives_is_far_out_and_a_conflict(told: Answer) -> None:
     """Without errors the raw box has 60 % here; the paper's car S2 has 68 %."""
     fit = next(f for f in told.fits if f.system == "car" and f.baseline == BASELINE)
     first, second = fit.reach
-    assert first.reached and not second.reached
-    assert second.highest < 0.66 and fit.verdict == "conflict" and fit.joint_p < 0.05
+    assert first.reached and first.tail_p > 0.1
+    assert second.highest < 0.66 and second.tail_p < 0.02
+    assert fit.verdict == "conflict" and fit.joint_p < 0.05
 
 
 def test_levels_that_reach_both_cells_are_no_conflict(told: Answer) -> None:
