@@ -7,10 +7,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
+import jaxtyping
 import numpy as np
 import scipy.stats  # noqa: F401  (its import draws without a seed: before the poison below)
 from hypothesis import settings
-from jaxtyping import install_import_hook
+
+from tests.checked import checked
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("fusion", "scenarios", "simbench")
@@ -44,9 +46,10 @@ def checked_modules() -> Iterator[str]:
             yield ".".join(path.relative_to(ROOT).with_suffix("").parts)
 
 
-# An int is a float, as type checkers have it.
-CHECKER = "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))"
-install_import_hook(list(checked_modules()), CHECKER)
+# An int is a float, as type checkers have it. A wrong argument is a TypeError, as jaxtyping has it.
+CHECKER = "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True, violation_type=TypeError))"
+jaxtyping.install_import_hook(list(checked_modules()), CHECKER)  # puts `jaxtyping.jaxtyped` around functions
+jaxtyping.jaxtyped = checked
 
 
 # -- randomness: whoever draws is handed a Generator -------------------------------------------------------
