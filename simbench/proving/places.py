@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 from scenarios.faults import EdgeError, FaultSpec, MotionBlur
@@ -101,6 +101,7 @@ def _telling(tell: Callable[..., Any], receipts: Callable[..., Any]) -> Proving:
 
 
 def _drive(ground: Callable[[], Stage], pictures: bool = False) -> Proving:
+    @lru_cache(maxsize=8)  # each mutant is compared with the same honest drive
     def make(specs: tuple[FaultSpec, ...], seed: int) -> Made:
         rig = ground().rig
         for spec in specs:
