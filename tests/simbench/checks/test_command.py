@@ -4,16 +4,29 @@ from __future__ import annotations
 
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
+from unittest import mock
 
+import pytest
 from click.testing import CliRunner, Result
 
+from simbench.checks import drives
 from simbench.checks.relations import QUICK_SEEDS, RELATIONS, SEEDS
 from simbench.cli import main
 
 ROOT = Path(__file__).resolve().parents[3]
 DOCUMENT = (ROOT / "docs" / "pipeline.md").read_text(encoding="utf-8")
 BROKEN = str(Path(__file__).with_name("broken.py"))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short() -> Iterator[None]:
+    """Drives of 0.8 s: what the relations say of whole ones is asked in test_relations.py."""
+    drives.recorded.cache_clear()
+    with mock.patch.object(drives, "DURATION_S", 0.8):
+        yield
+    drives.recorded.cache_clear()
 
 
 def asked(*words: str) -> Result:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import mujoco
 import numpy as np
@@ -16,6 +17,7 @@ from fusion.messages import Calibration
 from scenarios.faults import Drift, FaultSpec, Flex, Knock, Vibration
 from scenarios.load import load_sensor
 from scenarios.scenario import LidarSensor
+from simbench.capture import Captured
 from simbench.faults.lidar_pose import turned
 from simbench.faults.motion import bracket_shake
 from simbench.faults.mounts import drifting, knocked
@@ -154,11 +156,15 @@ def found(
     *specs: FaultSpec, asked: tuple[FaultSpec, ...] | None = None, drawn: bool = True
 ) -> tuple[Receipt, ...]:
     """Receipts of `asked` (default: what acted) where `specs` acted; drawn: with what really was drawn."""
-    captured = posed(staged(specs=specs))
-    wanted = staged(specs=specs if asked is None else asked)
+    captured, asked = under(specs), specs if asked is None else asked
     if not drawn:
-        captured = replace(captured, drawn=posed(wanted).drawn)
-    return receipts_of(captured, wanted)
+        captured = replace(captured, drawn=under(asked).drawn)
+    return receipts_of(captured, staged(specs=asked))
+
+
+@cache
+def under(specs: tuple[FaultSpec, ...]) -> Captured:
+    return posed(staged(specs=specs))
 
 
 BRACKETS: dict[str, FaultSpec] = {
