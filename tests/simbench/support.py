@@ -90,6 +90,12 @@ def posed(at: Stage, seed: int = 0) -> Captured:
         return recorded(at, seed)
 
 
+@lru_cache(maxsize=16)
+def posed_under(*specs: FaultSpec) -> Captured:
+    """Of the usual stage under some faults. Not to be changed: it is made once."""
+    return posed(staged(specs=specs))
+
+
 def with_scans_of(scans_of: Captured, at: Stage, seed: int = 0) -> Captured:
     """A recording with the scans of another one of the same world and body shake, not cast again."""
     delivered = (m for m in scans_of.recording.messages if isinstance(m, LidarScan))

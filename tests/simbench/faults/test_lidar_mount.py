@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
 
 import mujoco
 import numpy as np
@@ -17,7 +16,6 @@ from fusion.messages import Calibration
 from scenarios.faults import Drift, FaultSpec, Flex, Knock, Vibration
 from scenarios.load import load_sensor
 from scenarios.scenario import LidarSensor
-from simbench.capture import Captured
 from simbench.faults.lidar_pose import turned
 from simbench.faults.motion import bracket_shake
 from simbench.faults.mounts import drifting, knocked
@@ -28,7 +26,7 @@ from simbench.sensors import lidar, rays
 from simbench.sensors.render import place
 from tests.simbench.scenes import Shape, straight, toy_motion, toy_world
 from tests.simbench.scenes import staged as scene_of
-from tests.simbench.support import bytes_of, posed, receipts_of, recorded, staged
+from tests.simbench.support import bytes_of, posed, posed_under, receipts_of, recorded, staged
 
 MS = 1_000_000
 ABOVE = Transform(rotation=np.eye(3), translation_m=np.array([0.0, 0.0, 1.85]))
@@ -156,15 +154,10 @@ def found(
     *specs: FaultSpec, asked: tuple[FaultSpec, ...] | None = None, drawn: bool = True
 ) -> tuple[Receipt, ...]:
     """Receipts of `asked` (default: what acted) where `specs` acted; drawn: with what really was drawn."""
-    captured, asked = under(specs), specs if asked is None else asked
+    captured, asked = posed_under(*specs), specs if asked is None else asked
     if not drawn:
-        captured = replace(captured, drawn=under(asked).drawn)
+        captured = replace(captured, drawn=posed_under(*asked).drawn)
     return receipts_of(captured, staged(specs=asked))
-
-
-@cache
-def under(specs: tuple[FaultSpec, ...]) -> Captured:
-    return posed(staged(specs=specs))
 
 
 BRACKETS: dict[str, FaultSpec] = {

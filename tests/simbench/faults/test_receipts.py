@@ -411,7 +411,7 @@ def test_measured_minus_realised_is_within_the_published_errors() -> None:
     )
     z: dict[tuple[str, str], list[float]] = defaultdict(list)
     for seed in range(30):
-        at = staged("car" if seed % 5 == 0 else "wearable", seed, specs=specs)
+        at = staged("car" if seed % 5 == 0 else "wearable", seed % 10, specs=specs)  # ten drives, 30 draws
         for receipt in proof(at, seed):
             assert receipt.measured is not None and receipt.status != MISMATCH, receipt
             kind = (

@@ -30,7 +30,7 @@ from simbench.faults.scripted import mode_shake, spectrum_rms, spectrum_shake
 from simbench.faults.trace import COLUMNS, read_trace, trace_shake
 from simbench.mount import Together
 from simbench.stage import stage
-from tests.simbench.support import posed, receipts_of, staged
+from tests.simbench.support import posed_under, receipts_of, staged
 
 DEG = np.deg2rad(1.0)
 MS = 1_000_000
@@ -40,12 +40,10 @@ def found(
     *specs: FaultSpec, asked: tuple[FaultSpec, ...] | None = None, drawn: bool = True
 ) -> tuple[Receipt, ...]:
     """Receipts of `asked` (default: what acted) where `specs` acted; drawn: with what really was drawn."""
-    at = staged(specs=specs)
-    captured = posed(at)
-    wanted = staged(specs=specs if asked is None else asked)
+    captured, asked = posed_under(*specs), specs if asked is None else asked
     if not drawn:
-        captured = replace(captured, drawn=posed(wanted).drawn)
-    return receipts_of(captured, wanted)
+        captured = replace(captured, drawn=posed_under(*asked).drawn)
+    return receipts_of(captured, staged(specs=asked))
 
 
 def power_at(signal: np.ndarray, step_s: float) -> tuple[np.ndarray, np.ndarray]:
