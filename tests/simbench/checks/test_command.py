@@ -35,6 +35,7 @@ def asked(*words: str) -> Result:
 
 def test_the_documents_example_prints_a_line_for_every_relation_and_all_hold() -> None:
     (command,) = re.findall(r"^python3 dev\.py run simbench check (.+)$", DOCUMENT, re.MULTILINE)
+    assert f"Example: simbench check {command}\n" in str(main.commands["check"].help) + "\n"
     done = asked(*shlex.split(command))
     assert done.exit_code == 0, done.output
     *lines, last = done.output.splitlines()
