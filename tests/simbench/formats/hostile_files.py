@@ -68,7 +68,7 @@ JSONL: dict[str, tuple[bytes, str]] = {
     "position-1e999": (line(position_ego_m=b"[[1e999, 0, 0]]"), "finite|less"),
     "key-of-escapes": (SCHEMA + b'{"\\u001b[2J": 1}', "one 'output' or one 'trajectory'"),
     "unknown-key-of-escapes": (line(**{"\\u001b[2J" * 900: b"1"}), "not permitted"),
-    "half-a-character": (line(track_id=b'"\\ud800"'), ""),
+    "half-a-character": (line(track_id=b'"\\ud800"'), "invalid JSON"),
     "sensor-of-escapes": (
         SCHEMA + b'{"output": {"scan_sensor": "\\u001b[2J", "scan_seq": 0, "scan_stamp_ns": 0, '
         b'"objects": []}}',
