@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from scenarios.errors import BadInput
 from scenarios.seeding import stream
 from simbench.explain.attribution import Attribution
 from simbench.reproduce.boards import BoardTable, board_tables
@@ -72,3 +73,19 @@ def answer(found: Found, executor: Executor) -> Answer:
 def as_json(found: Answer) -> str:
     """The stored result. ValueError: a number that is not finite."""
     return json.dumps({"schema": SCHEMA, **asdict(found)}, indent=1, allow_nan=False) + "\n"
+
+
+def read_answer(text: str, file: str) -> Answer:
+    """A stored result. BadInput: it is none, or of another version."""
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise BadInput(f"is malformed: {error}", file=file) from None
+    if not isinstance(data, dict) or data.pop("schema", None) != SCHEMA:
+        raise BadInput("is no result of a reproduction", file=file, allowed=SCHEMA)
+    try:
+        return TypeAdapter(Answer).validate_python(data)
+    except ValidationError as error:
+        raise BadInput(f"is malformed: {' '.join(str(error).split())[:200]}", file=file) from None

@@ -11,8 +11,9 @@ from unittest import mock
 
 import pytest
 
+from scenarios.errors import BadInput
 from simbench.campaign.local import Here
-from simbench.reproduce.answer import Answer, answer, as_json
+from simbench.reproduce.answer import Answer, answer, as_json, read_answer
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import BASELINE, GROUND, METHOD, OURS
 from simbench.reproduce.files import as_csv, as_latex
@@ -119,6 +120,18 @@ def test_findings_answer_every_question_with_numbers(told: Answer) -> None:
         for line in one.says:
             assert re.search(r"\d", line), line
             assert "None" not in line and "nan" not in line, line
+
+
+def test_a_stored_result_is_read_as_it_was(told: Answer) -> None:
+    again = read_answer(as_json(told), "result.json")
+    assert as_json(again) == as_json(told)
+    assert [one.says for one in findings(again)] == [one.says for one in findings(told)]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"schema": "simbench-reproduction/1"}', "[" * 100_000])
+def test_what_is_no_stored_result_is_refused_in_a_sentence(text: str) -> None:
+    with pytest.raises(BadInput, match=r"result\.json.* is (no result|malformed)"):
+        read_answer(text, "result.json")
 
 
 def test_the_stored_result_holds_finite_numbers_only(told: Answer) -> None:
