@@ -341,7 +341,7 @@ def pytest_command(arguments: Sequence[str]) -> list[str]:
     chosen = any(
         word.startswith(("-n", "--numprocesses", "--pdb")) or word == "no:xdist" for word in arguments
     )
-    workers = [] if chosen else ["-n", "auto", "--dist", "loadfile"]
+    workers = [] if chosen else ["-n", "auto", "--dist", "loadfile", "--no-loadscope-reorder"]
     return [PYTHON, "-m", "pytest", *workers, *arguments]
 
 

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 import jaxtyping
 import numpy as np
+import pytest
 import scipy.stats  # noqa: F401  (its import draws without a seed: before the poison below)
 from hypothesis import settings
 
@@ -78,3 +79,15 @@ for _name in dir(np.random):
     if isinstance(_owner, np.random.RandomState) and _name not in _KEPT_FOR_HYPOTHESIS:
         setattr(np.random, _name, _poisoned(_name))
 np.random.default_rng = _seeded_default_rng(np.random.default_rng)
+
+
+# -- order: files that take long begin first, so that no worker waits for another at the end ---------------
+
+LONG = (
+    "test_install.py", "test_tutorial.py", "test_relations.py", "test_prove.py", "test_receipts.py",
+    "test_suite_run.py", "test_cluster.py", "test_run.py", "test_cli.py", "test_hostile.py",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: LONG.index(item.path.name) if item.path.name in LONG else len(LONG))
