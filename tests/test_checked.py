@@ -146,6 +146,10 @@ def test_axis_names_of_one_call_say_nothing_about_the_next_nor_about_calls_insid
     assert moved(zeros(5, 3), zeros(5, 3)).shape == (5, 3)
 
 
+def test_the_import_hook_uses_it() -> None:
+    assert hasattr(rotation_exp, "__simbench_checked__")
+
+
 def test_a_checked_function_looks_like_itself() -> None:
     assert (moved.__name__, moved.__doc__) == ("moved", "Moves.")
     assert moved.__wrapped__.__kwdefaults__ == {"times": 1}
