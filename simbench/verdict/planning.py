@@ -12,13 +12,14 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
-from scipy.special import chdtri, nctdtr, stdtrit
+from scipy.special import chdtri, nctdtr, ndtr, stdtrit
 
 from simbench.score.statistics import MIN_RUNS
 from simbench.verdict.decide import ALPHA
 
 POWER: Final = 0.8
 PILOT_LIMIT: Final = 0.8
+QUANTILES: Final = (np.arange(4000) + 0.5) / 4000.0
 MOST: Final = 1_000_000  # runs beyond which no plan goes
 
 
@@ -98,4 +99,13 @@ def power_of(n: int, *, sd: float, away: float, alpha: float = ALPHA) -> float:
     """Chance that n runs show on which side of the margin the truth lies, `away` from it."""
     if sd == 0.0:
         return 1.0
-    return 1.0 - float(nctdtr(n - 1, away / sd * np.sqrt(n), stdtrit(n - 1, 1.0 - alpha)))
+    return 1.0 - noncentral_t(stdtrit(n - 1, 1.0 - alpha), n - 1, away / sd * np.sqrt(n))
+
+
+def noncentral_t(t: float, df: int, shift: float) -> float:
+    """Chance that a noncentral t lies at or below t. SciPy's is not a number for some large shifts; there the
+    definition is integrated: E[Phi(t s - shift)] over s = sqrt(chi2 / df)."""
+    found = float(nctdtr(df, shift, t))
+    if np.isfinite(found):
+        return found
+    return float(ndtr(t * np.sqrt(chdtri(df, QUANTILES) / df) - shift).mean())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from unittest import mock
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 from scipy import integrate, stats
 
 from scenarios.seeding import stream
-from simbench.verdict.planning import plan, power_of, runs_needed, sd_limit
+from simbench.verdict.planning import noncentral_t, plan, power_of, runs_needed, sd_limit
 
 
 @pytest.mark.parametrize(("sd", "runs"), [(0.02, 8), (0.04, 27), (0.066, 69), (0.08, 101)])
@@ -51,6 +53,19 @@ def test_more_scatter_or_a_smaller_margin_never_need_fewer_runs(
     assert runs_needed(sd * more, margin=margin) >= here
     assert runs_needed(sd, margin=margin / more) >= here
     assert here == 6 or power_of(here - 1, sd=sd, away=margin) < 0.8 <= power_of(here, sd=sd, away=margin)
+
+
+@pytest.mark.parametrize(("df", "shift"), [(5, 0.5), (6, 3.0), (19, 2.0)])
+def test_where_the_library_has_no_number_the_definition_is_integrated(df: int, shift: float) -> None:
+    expected = stats.nct.cdf(2.0, df, shift)
+    with mock.patch("simbench.verdict.planning.nctdtr", return_value=float("nan")):
+        assert noncentral_t(2.0, df, shift) == pytest.approx(expected, abs=1e-4)
+
+
+def test_a_margin_of_many_spreads_is_decided_by_the_fewest_runs() -> None:
+    """SciPy's noncentral t is not a number at 7 runs here."""
+    assert all(power_of(n, sd=0.001, away=0.0176) == pytest.approx(1.0) for n in range(6, 20))
+    assert runs_needed(0.001, margin=0.0176) == 6
 
 
 def test_a_plan_from_a_pilot() -> None:
