@@ -167,6 +167,12 @@ def values_of(runs: Sequence[Run], metric: str) -> dict[int, float | None]:
     return {run.seed: run.metrics.get(metric) for run in runs}
 
 
+def mean_over(runs: Sequence[Run], metric: str) -> float | None:
+    """Of the runs that have a value; None: none has."""
+    values = [value for run in runs if (value := run.metrics.get(metric)) is not None]
+    return sum(values) / len(values) if values else None
+
+
 def _error(fix: Fix | None, reference: str) -> tuple[float, float] | None:
     error = None if fix is None else fix.error_m(reference)
     return None if error is None else (float(error[0]), float(error[1]))

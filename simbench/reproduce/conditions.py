@@ -3,7 +3,6 @@ readings of the measure make of it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,7 @@ from simbench.case import ORACLE
 from simbench.paper import MAE
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, PIPELINES, Cell
-from simbench.reproduce.collect import Run, values_of
+from simbench.reproduce.collect import Run, mean_over, values_of
 from simbench.reproduce.plan import CONDITIONS, Condition
 from simbench.reproduce.tables import MaeTable, TprTable, mae_table, missed_few, premise, tpr_table
 from simbench.score.metrics import BUDGET_AXES, BUDGET_PARTS, T1_POINTS
@@ -85,7 +84,7 @@ def _cell(found: Found, cell: Cell, condition: Condition, rng: np.random.Generat
         missed_few={name: missed_few(of, T1_POINTS) for name, of in runs.items()},
         premise={name: premise(of) for name, of in runs.items()},
         readings={
-            name: {reading: _mean(of, reading) for reading in READINGS}
+            name: {reading: mean_over(of, reading) for reading in READINGS}
             for name, of in runs.items()
             if name != ORACLE
         },
@@ -110,8 +109,3 @@ def _rig(found: Found, system: str, condition: Condition, rng: np.random.Generat
             for axis in BUDGET_AXES
         },
     )
-
-
-def _mean(runs: Sequence[Run], metric: str) -> float | None:
-    values = [value for run in runs if (value := run.metrics.get(metric)) is not None]
-    return float(np.mean(values)) if values else None

@@ -16,8 +16,6 @@ from simbench.reproduce.grids import Strip
 from simbench.reproduce.sheets import COLUMNS, fit_words
 from simbench.score.statistics import MIN_RUNS, Paired, Summary
 
-SURELY = "more than chance"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Finding:

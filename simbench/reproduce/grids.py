@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import PIPELINES
-from simbench.reproduce.collect import Run
+from simbench.reproduce.collect import mean_over
 from simbench.reproduce.levels import LEVELS
 
 
@@ -55,7 +52,7 @@ def heat_maps(found: Found) -> tuple[HeatMap, ...]:
                 HeatMap(
                     cell=cell, pipeline=pipeline, offset_ms=tuple(offsets), shake_deg=tuple(shakes),
                     tpr=tuple(
-                        tuple(_mean(runs[offset, shake], "tpr") for offset in offsets) for shake in shakes
+                        tuple(mean_over(runs[offset, shake], "tpr") for offset in offsets) for shake in shakes
                     ),
                     n=min(len(at) for at in runs.values()),
                 )
@@ -83,8 +80,8 @@ def strips(found: Found) -> tuple[Strip, ...]:
                 rows.append(
                     Strip(
                         cell=cell, pipeline=pipeline, cause=level.name, unit=level.unit, bound=level.bound,
-                        level=(0.0, *points), tpr=tuple(_mean(runs, "tpr") for runs in at),
-                        mae_m=tuple(_mean(runs, "mae_m.smooth") for runs in at),
+                        level=(0.0, *points), tpr=tuple(mean_over(runs, "tpr") for runs in at),
+                        mae_m=tuple(mean_over(runs, "mae_m.smooth") for runs in at),
                         n=min(len(runs) for runs in at),
                     )
                 )  # fmt: skip
@@ -93,8 +90,3 @@ def strips(found: Found) -> tuple[Strip, ...]:
 
 def _cells(found: Found, part: str) -> tuple[str, ...]:
     return tuple(dict.fromkeys(ask.cell for ask in found.runs if ask.part == part))
-
-
-def _mean(runs: Sequence[Run], metric: str) -> float | None:
-    values = [value for run in runs if (value := run.metrics.get(metric)) is not None]
-    return float(np.mean(values)) if values else None

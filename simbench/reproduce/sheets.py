@@ -10,7 +10,7 @@ from simbench.reproduce.answer import Answer
 from simbench.reproduce.boards import BoardTable
 from simbench.reproduce.cells import BASELINE, GROUND, METHOD, OURS, PIPELINES
 from simbench.reproduce.conditions import READINGS, CellTable, ConditionTable
-from simbench.reproduce.fit.study import Fit
+from simbench.reproduce.fit.study import CellReach, Fit
 from simbench.reproduce.tables import Spread, TprTable
 from simbench.score.statistics import Summary
 
@@ -336,7 +336,7 @@ def fit_words(fit: Fit) -> Iterator[str]:
         yield (
             f"{one.cell}: printed {100 * one.observed:.1f} %, within reach {100 * one.lowest:.1f} to "
             f"{100 * one.highest:.1f} % (p = {one.tail_p:.3f}): "
-            f"{'reached' if one.reached else 'not reached'}."
+            f"{reach_words(one)}."
         )
     yield (
         f"{fit.points} levels in a Sobol design; Gaussian-process emulators with "
@@ -357,6 +357,13 @@ def fit_words(fit: Fit) -> Iterator[str]:
         )
     if fit.why:
         yield fit.why
+
+
+def reach_words(one: CellReach) -> str:
+    """Whether any level reaches a cell, as far as the emulator knows."""
+    if one.reached:
+        return "reached"
+    return "not reached" if one.excluded else "not known, the emulator is in doubt"
 
 
 def predictions(fit: Fit) -> Sheet:

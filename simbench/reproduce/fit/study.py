@@ -25,6 +25,7 @@ from simbench.reproduce.fit.conflict import conflict, reach
 from simbench.reproduce.fit.describe import (
     fitting,
     posterior_correlations,
+    posterior_means,
     posterior_quantiles,
     prior_share,
 )
@@ -56,7 +57,6 @@ class CellReach:
     reached: bool
     excluded: bool
     tail_p: float
-    words: str
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +174,7 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
         reach=tuple(
             CellReach(
                 cell=name, observed=one.observed, lowest=one.lowest, highest=one.highest,
-                reached=one.reached, excluded=one.excluded, tail_p=float(tail), words=one.words,
+                reached=one.reached, excluded=one.excluded, tail_p=float(tail),
             )
             for name, one, tail in zip(
                 names, reach(at, observed, run_cov, DISCREPANCY), doubt.cell_p, strict=True
@@ -231,7 +231,7 @@ def _levels(
 ) -> tuple[LevelPosterior, ...]:  # fmt: skip
     levels = LEVELS[system]
     low, median, high = posterior_quantiles(posterior, (0.05, 0.5, 0.95)).tolist()
-    means = posterior.weights @ posterior.draws
+    means = posterior_means(posterior)
     curves = alone(
         emulators, observed, run_cov, DISCREPANCY, np.zeros(len(levels)), grids(posterior.draws, GRID)
     )

@@ -20,7 +20,7 @@ from simbench.reproduce.files import as_csv, as_latex
 from simbench.reproduce.findings import as_markdown, findings
 from simbench.reproduce.fit.study import fit_rig
 from simbench.reproduce.levels import GROUPS
-from simbench.reproduce.sheets import sheets
+from simbench.reproduce.sheets import reach_words, sheets
 from tests.simbench.reproduce.made_up import CLEAN, LOSS, SMALL, made_up
 
 FEWER = (
@@ -137,3 +137,12 @@ def test_what_is_no_stored_result_is_refused_in_a_sentence(text: str) -> None:
 def test_the_stored_result_holds_finite_numbers_only(told: Answer) -> None:
     data = json.loads(as_json(told), parse_constant=pytest.fail)
     assert data["schema"] == "simbench-reproduction/1" and data["runs"] == told.runs
+
+
+def test_what_the_emulator_does_not_know_is_not_called_out_of_reach(told: Answer) -> None:
+    one = told.fits[0].reach[0]
+    said = [
+        reach_words(replace(one, reached=reached, excluded=excluded))
+        for reached, excluded in ((True, False), (False, True), (False, False))
+    ]
+    assert said == ["reached", "not reached", "not known, the emulator is in doubt"]
