@@ -15,6 +15,7 @@ from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import BASELINE, GROUND
 from simbench.reproduce.conditions import ConditionTable, condition_tables
 from simbench.reproduce.effects import Mended, attributions, mended
+from simbench.reproduce.elsewhere import Elsewhere, elsewhere
 from simbench.reproduce.fit.study import Fit, fit_rig
 from simbench.reproduce.grids import HeatMap, Strip, heat_maps, strips
 from simbench.reproduce.levels import LEVELS
@@ -34,6 +35,7 @@ class Answer:
     boards: tuple[BoardTable, ...]
     conditions: tuple[ConditionTable, ...]
     steps: tuple[Changed, ...]
+    elsewhere: tuple[Elsewhere, ...]
     attributions: dict[str, tuple[Attribution, ...]]
     mended: tuple[Mended, ...]
     maps: tuple[HeatMap, ...]
@@ -62,6 +64,7 @@ def answer(found: Found, executor: Executor) -> Answer:
         boards=board_tables(found.boards, rng("boards")),
         conditions=condition_tables(found, rng("conditions")),
         steps=changes(found, rng("steps")),
+        elsewhere=elsewhere(found, rng("elsewhere")),
         attributions=attributions(found),
         mended=mended(found, rng("mended")),
         maps=heat_maps(found),

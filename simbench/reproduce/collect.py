@@ -18,11 +18,13 @@ from simbench.score.localization import Fix
 
 @dataclass(frozen=True, kw_only=True)
 class PairValue:
-    """A frame in a camera: its place in the drive, the paper's TPR and the exact precision and recall."""
+    """A frame in a camera: its place in the drive, the paper's TPR, the highest that any reference
+    distance gives, and the exact precision and recall."""
 
     scan_seq: int
     camera: str
     tpr: float
+    tpr_any: float
     precision: float
     recall: float
     n_true: int
@@ -130,8 +132,9 @@ def run_of(case: Case, seed: int, whole: bool = True) -> Run:
         if scores is None
         else tuple(
             PairValue(
-                scan_seq=pair.scan_seq, camera=pair.camera, tpr=pair.tpr, precision=pair.precision,
-                recall=pair.recall, n_true=pair.n_true, n_missed=pair.n_missed, hit=pair.hit,
+                scan_seq=pair.scan_seq, camera=pair.camera, tpr=pair.tpr, tpr_any=pair.tpr_any,
+                precision=pair.precision, recall=pair.recall, n_true=pair.n_true,
+                n_missed=pair.n_missed, hit=pair.hit,
             )
             for pair in scores.pairs
         ),

@@ -5,6 +5,7 @@
 | board | a calibration with a checkerboard, by rig and seed | Table I |
 | tables | every cell, without errors, with all at bounds, and as the numbers are reached | II, III, MAE |
 | variants | the method with one step or reading changed | ablation, readings |
+| scenes | every cell in other scenes, without errors and with all at bounds | what must differ |
 | groups | S1: every set of the groups of causes, each at its bound | attribution, what to mend first |
 | map | trigger offset times body shake | heat map |
 | strips | each cause alone, up to far beyond its bound | frontiers |
@@ -26,15 +27,17 @@ from scenarios.seeding import stream
 from simbench.case import Job
 from simbench.reproduce.cells import BASELINE, CELLS, FAULTS, GROUND, METHOD, PIPELINES, Cell
 from simbench.reproduce.levels import GROUPS, LEVELS, NONE_FAULTS, at_bounds, faults_at, prior
+from simbench.reproduce.scenes import SCENES, changes_of
 from simbench.reproduce.variants import NAMES, reference_of
 
-Part = Literal["tables", "variants", "groups", "map", "strips", "fit"]
+Part = Literal["tables", "variants", "scenes", "groups", "map", "strips", "fit"]
 Condition = Literal["none", "bounds", "reached"]
 CONDITIONS: Mapping[Condition, str] = {
     "none": "no error is injected",
     "bounds": "every cause at its physical bound",
     "reached": "found by hand: reaches the paper's first scenario, by brackets that bend unphysically",
 }
+SCENE_CONDITIONS: tuple[Condition, ...] = ("none", "bounds")
 RIGS: Mapping[str, str] = {"car": "car-six-cameras", "wearable": "wearable-front"}
 MAP_OFFSETS_MS = (0.0, 50.0, 100.0, 150.0)
 MAP_SHAKES_DEG: Mapping[str, tuple[float, ...]] = {
@@ -53,14 +56,15 @@ class Size:
     seeds: int
     boards: int
     variants: int
+    scenes: int
     groups: int
     map: int
     strips: int
     fit_points: int
 
 
-FULL = Size(name="full", seeds=20, boards=3, variants=6, groups=6, map=3, strips=2, fit_points=128)
-QUICK = Size(name="quick", seeds=2, boards=1, variants=1, groups=0, map=0, strips=0, fit_points=0)
+FULL = Size(name="full", seeds=20, boards=3, variants=6, scenes=3, groups=4, map=3, strips=2, fit_points=128)
+QUICK = Size(name="quick", seeds=2, boards=1, variants=1, scenes=0, groups=0, map=0, strips=0, fit_points=0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,8 +94,8 @@ class BoardAsk:
 def asks(size: Size) -> tuple[Ask, ...]:
     """All runs; those that share a drive one after the other (`simbench/reuse.py`)."""
     found = [
-        *_tables(size.seeds), *_variants(size.variants), *_groups(size.groups), *_map(size.map),
-        *_strips(size.strips), *_fit(size.fit_points),
+        *_tables(size.seeds), *_variants(size.variants), *_scenes(size.scenes), *_groups(size.groups),
+        *_map(size.map), *_strips(size.strips), *_fit(size.fit_points),
     ]  # fmt: skip
     return tuple(sorted(found, key=_drive))
 
@@ -144,6 +148,13 @@ def _variants(seeds: int) -> Iterator[Ask]:
     for cell, seed in product(CELLS, range(seeds)):
         job = replace(cell.job(seed, condition_faults(cell, "reached"), pipelines), isolate="none")
         yield Ask(part="variants", cell=cell.name, point=(), job=job)
+
+
+def _scenes(seeds: int) -> Iterator[Ask]:
+    for cell, scene, condition, seed in product(CELLS, SCENES, SCENE_CONDITIONS, range(seeds)):
+        job = cell.job(seed, condition_faults(cell, condition), (BASELINE, GROUND, METHOD))
+        job = replace(job, changes=changes_of(scene, cell), boxes=scene.boxes)
+        yield Ask(part="scenes", cell=cell.name, point=(scene.name, condition), job=job)
 
 
 def _groups(seeds: int) -> Iterator[Ask]:

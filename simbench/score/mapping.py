@@ -43,9 +43,10 @@ class PairScore:
     """One eligible pair's counts. `track_id` is None where the pipeline gave no object for it.
 
     n_window*: mapped points within the window around the surface, centre and GNSS distance (GNSS: None before
-    its first fix). n_correct: mapped points that hit the target. n_true: the target's true points in this
-    image; n_found: those that were mapped. hit: the representative lies in the target's grown box. target:
-    which of several targets, by its place among them.
+    its first fix), and around the distance with most of them, which no annotated distance can exceed.
+    n_correct: mapped points that hit the target. n_true: the target's true points in this image; n_found:
+    those that were mapped. hit: the representative lies in the target's grown box. target: which of several
+    targets, by its place among them.
     """
 
     frame: int
@@ -60,6 +61,7 @@ class PairScore:
     n_window: int
     n_window_centre: int
     n_window_gnss: int | None
+    n_window_any: int
     n_correct: int
     n_true: int
     n_found: int
@@ -80,6 +82,10 @@ class PairScore:
     @property
     def tpr_gnss(self) -> float | None:
         return None if self.n_window_gnss is None else self._share(self.n_window_gnss)
+
+    @property
+    def tpr_any(self) -> float:
+        return self._share(self.n_window_any)
 
     @property
     def precision(self) -> float:
@@ -104,6 +110,13 @@ def window_m(recording: Recording) -> float:
         raise ValueError(f"the recording names no size for category {target.category!r}")
     length_m, width_m, _ = recording.categories[target.category].mean_m
     return WINDOW_SHARE * max(length_m, width_m)
+
+
+def most_within(distance_m: np.ndarray, width_m: float) -> int:
+    """The most distances that an interval of some width can hold, its ends included."""
+    ordered = np.sort(distance_m)
+    held = np.searchsorted(ordered, ordered + width_m, side="right") - np.arange(len(ordered))
+    return int(held.max(initial=0))
 
 
 def is_hit(recording: Recording, frame: Frame, found: LocalizedObject) -> bool:
@@ -164,6 +177,7 @@ def score_pairs(
                 n_window=near(pair.surface_distance_m),
                 n_window_centre=near(pair.centre_distance_m),
                 n_window_gnss=None if pair.gnss_distance_m is None else near(pair.gnss_distance_m),
+                n_window_any=most_within(distance_m, 2.0 * half_m),
                 n_correct=int(np.count_nonzero(frame.truth.object_id[points] == target)),
                 n_true=len(pair.points),
                 n_found=int(np.isin(pair.points, points).sum()),

@@ -133,7 +133,9 @@ def test_every_verb_has_an_example_that_runs(
         systems[system] = systems[system].model_copy(update={"duration_s": 0.8})  # type: ignore[index]
         return changed.model_copy(update={"systems": systems})
 
-    tiny = Size(name="quick", seeds=1, boards=1, variants=1, groups=1, map=1, strips=1, fit_points=0)
+    tiny = Size(
+        name="quick", seeds=1, boards=1, variants=1, scenes=1, groups=1, map=1, strips=1, fit_points=0
+    )
     with (
         mock.patch("simbench.reproduce.plan.QUICK", tiny),
         mock.patch("simbench.reproduce.campaign.row_of", made_up_row),

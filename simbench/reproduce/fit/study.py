@@ -112,6 +112,7 @@ class Sensitivity:
 class Fit:
     """verdict: `fits`: levels within physics reach all values together; `conflict`: they do not, within what
     chance and discrepancy allow (joint_p, Evans & Moshonov 2006, below 0.05), and the posterior is no answer.
+    exchanged_p: joint_p if the paper's two scenarios are the other way round.
     share: of the prior's draws that fit; samples: draws of the posterior, a row a draw; plane: what draws of
     the prior give in the two cells."""
 
@@ -124,6 +125,7 @@ class Fit:
     discrepancy: float
     verdict: Literal["fits", "conflict"]
     joint_p: float
+    exchanged_p: float
     share: float
     prior_share: float
     ess: float
@@ -158,19 +160,17 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
     emulators = [emulator(column) for column in values.T]
     draws = prior(levels, rng("draws").random((DRAWS, len(levels))))
     printed = tuple(cell.printed for cell in cells)
-    observed = Observed.of(
-        [row.baseline for row in printed], passes=PASSES, frame_sd=[row.baseline_sd for row in printed],
-        frames=[row.n for row in printed],
-    )  # fmt: skip
+    observed, exchanged = _baselines(printed), _baselines(printed[::-1])
     at, run_cov = emulated(emulators, draws), run_covariance(emulators, independent=True)
     posterior = infer(draws, at, observed, run_cov, DISCREPANCY, rng("resampling"), keep=SHOWN)
     doubt = conflict(at, observed, run_cov, DISCREPANCY, rng("conflict"))
+    other_way = conflict(at, exchanged, run_cov, DISCREPANCY, rng("exchanged"))
     return Fit(
         system=system, baseline=baseline, cells=names, observed=tuple(observed.values.tolist()), points=count,
         emulators=tuple(goodness(one) for one in emulators), discrepancy=DISCREPANCY,
         verdict="conflict" if doubt.joint_p < 0.05 else "fits", joint_p=doubt.joint_p,
-        share=float(fitting(posterior).mean()), prior_share=prior_share(posterior), ess=posterior.ess,
-        why=posterior.why,
+        exchanged_p=other_way.joint_p, share=float(fitting(posterior).mean()),
+        prior_share=prior_share(posterior), ess=posterior.ess, why=posterior.why,
         reach=tuple(
             CellReach(
                 cell=name, observed=one.observed, lowest=one.lowest, highest=one.highest,
@@ -199,6 +199,14 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
             for other in OTHERS
             for again in (infer(draws, at, observed, run_cov, other, rng(f"again {other}"), keep=SHOWN),)
         ),
+    )  # fmt: skip
+
+
+def _baselines(printed: Sequence[PaperTpr]) -> Observed:
+    """The baselines of these rows, cell by cell."""
+    return Observed.of(
+        [row.baseline for row in printed], passes=PASSES, frame_sd=[row.baseline_sd for row in printed],
+        frames=[row.n for row in printed],
     )  # fmt: skip
 
 

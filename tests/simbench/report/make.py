@@ -84,6 +84,7 @@ def pair_score(scan: int, tpr: float) -> PairScore:
         n_window=round(100 * tpr),
         n_window_centre=0,
         n_window_gnss=None,
+        n_window_any=100,
         n_correct=50,
         n_true=60,
         n_found=40,

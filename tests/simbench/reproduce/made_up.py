@@ -17,7 +17,7 @@ from simbench.reproduce.plan import Ask, BoardAsk, Size, asks, board_asks, fit_p
 from simbench.score.metrics import METRICS
 
 SMALL = Size(
-    name="full", seeds=6, boards=2, variants=6, groups=6, map=2, strips=2, fit_points=32,
+    name="full", seeds=6, boards=2, variants=6, scenes=3, groups=6, map=2, strips=2, fit_points=32,
 )  # fmt: skip
 CLEAN = {BASELINE: 0.60, GROUND: 0.70, METHOD: 0.75, OURS: 0.85, ORACLE: 0.95}
 LOSS = {BASELINE: 0.50, GROUND: 0.40, METHOD: 0.20, OURS: 0.05, ORACLE: 0.0}
@@ -82,8 +82,8 @@ def _run(ask: Ask, name: str, rng: np.random.Generator) -> Run:
         pipeline=name, seed=ask.job.seed, why=None, metrics=metrics,
         pairs=tuple(
             PairValue(
-                scan_seq=i, camera="cam-0", tpr=float(value), precision=float(value), recall=1.0, n_true=9,
-                n_missed=int(value < 0.5) * 9, hit=bool(value > 0.5),
+                scan_seq=i, camera="cam-0", tpr=float(value), tpr_any=float(value), precision=float(value),
+                recall=1.0, n_true=9, n_missed=int(value < 0.5) * 9, hit=bool(value > 0.5),
             )
             for i, value in enumerate(tpr if ask.whole else ())
         ),

@@ -25,7 +25,15 @@ def rng() -> np.random.Generator:
 
 def pair(seq: int, tpr: float, missed: int = 0, hit: bool = True) -> PairValue:
     return PairValue(
-        scan_seq=seq, camera="a", tpr=tpr, precision=tpr, recall=1.0, n_true=9, n_missed=missed, hit=hit
+        scan_seq=seq,
+        camera="a",
+        tpr=tpr,
+        tpr_any=tpr,
+        precision=tpr,
+        recall=1.0,
+        n_true=9,
+        n_missed=missed,
+        hit=hit,
     )
 
 
