@@ -63,7 +63,7 @@ class Size:
     fit_points: int
 
 
-FULL = Size(name="full", seeds=20, boards=3, variants=6, scenes=3, groups=4, map=3, strips=2, fit_points=128)
+FULL = Size(name="full", seeds=20, boards=3, variants=6, scenes=3, groups=3, map=2, strips=2, fit_points=128)
 QUICK = Size(name="quick", seeds=2, boards=1, variants=1, scenes=0, groups=0, map=0, strips=0, fit_points=0)
 
 
