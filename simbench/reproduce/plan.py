@@ -129,9 +129,11 @@ def fit_points(system: str, count: int) -> Float64[np.ndarray, "n d"]:
 
 def strip_levels(bound: float, fault: str) -> tuple[float, ...]:
     """Levels of a cause alone: half, once, twice and four times its bound; up to the bound where there is
-    nothing beyond (a lag of one frame, half a turn)."""
+    nothing beyond (a lag of one frame, half a turn), to twice where no such lens shows a whole picture."""
     if "lag_frames" in fault or "trigger_angle" in fault:
         return tuple(share * bound for share in (0.25, 0.5, 0.75, 1.0))
+    if "undistorted_px" in fault:
+        return tuple(times * bound for times in (0.5, 1.0, 1.5, 2.0))
     if "stale_frames" in fault:
         return (1.0, 2.0, 3.0, 4.0)
     return tuple(times * bound for times in STRIP_TIMES)
