@@ -16,10 +16,10 @@ from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import METHOD, OURS, PIPELINES
 from simbench.reproduce.collect import values_of
 from simbench.reproduce.levels import GROUPS
+from simbench.reproduce.plan import EVERYTHING
 from simbench.score.statistics import Paired, paired
 
 LOSSES = ("tpr", "mae_m.smooth")
-WHOLE = (1 << len(GROUPS)) - 1
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,24 +45,24 @@ def attributions(found: Found) -> dict[str, tuple[Attribution, ...]]:
 
 
 def _taken_apart(found: Found, cell: str, pipeline: str, metric: str) -> Attribution:
-    seeds = sorted({ask.job.seed for ask in found.runs if ask.part == "groups" and ask.cell == cell})
+    seeds = range(found.size.groups)
     sign = -1.0 if metric == "tpr" else 1.0
     rows = []
-    for mask in range(WHOLE + 1):
+    for mask in range(EVERYTHING + 1):
         values = values_of(found.of("groups", cell, pipeline, mask), metric)
         known = [values.get(seed) for seed in seeds]
         rows.append([np.nan if value is None else sign * value for value in known])
-    return attribute(np.array(rows), GROUPS, seeds, pipeline=pipeline, metric=metric)
+    return attribute(np.array(rows), GROUPS, list(seeds), pipeline=pipeline, metric=metric)
 
 
 def mended(found: Found, rng: np.random.Generator) -> tuple[Mended, ...]:
     """By cell: each group, then the algorithm."""
     rows = []
     for cell in dict.fromkeys(ask.cell for ask in found.runs if ask.part == "groups"):
-        before = found.of("groups", cell, METHOD, WHOLE)
+        before = found.of("groups", cell, METHOD, EVERYTHING)
         after = {
-            group: found.of("groups", cell, METHOD, WHOLE ^ (1 << i)) for i, group in enumerate(GROUPS)
-        } | {"algorithm": found.of("groups", cell, OURS, WHOLE)}
+            group: found.of("groups", cell, METHOD, EVERYTHING ^ (1 << i)) for i, group in enumerate(GROUPS)
+        } | {"algorithm": found.of("groups", cell, OURS, EVERYTHING)}
         rows += [
             Mended(
                 cell=cell, what=what,

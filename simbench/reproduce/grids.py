@@ -65,15 +65,14 @@ def strips(found: Found) -> tuple[Strip, ...]:
     rows = []
     for cell in _cells(found, "strips"):
         system = cell.split()[0]
-        seeds = {ask.job.seed for ask in found.runs if ask.part == "strips" and ask.cell == cell}
         for level in LEVELS[system]:
-            points = sorted(
-                {
-                    float(ask.point[1])
-                    for ask in found.runs
-                    if ask.part == "strips" and ask.cell == cell and ask.point[0] == level.name
-                }
-            )
+            mine = [
+                ask
+                for ask in found.runs
+                if ask.part == "strips" and ask.cell == cell and ask.point[0] == level.name
+            ]
+            points = sorted({float(ask.point[1]) for ask in mine})
+            seeds = {ask.job.seed for ask in mine}
             for pipeline in PIPELINES:
                 clean = [r for r in found.of("tables", cell, pipeline, "none") if r.seed in seeds]
                 at = [clean, *(found.of("strips", cell, pipeline, level.name, value) for value in points)]

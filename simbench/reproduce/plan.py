@@ -46,11 +46,17 @@ MAP_SHAKES_DEG: Mapping[str, tuple[float, ...]] = {
 }
 STRIP_TIMES = (0.5, 1.0, 2.0, 4.0)
 FIRST_FIT_SEED = 1000
+EVERYTHING = (1 << len(GROUPS)) - 1
+MENDED = (EVERYTHING, *(EVERYTHING ^ (1 << group) for group in range(len(GROUPS))))
+"""Sets of groups, as bits: all of them, and all but one."""
+ALONE = ("trigger offset", "spin phase")
+"""Causes of which it is asked whether they matter alone."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Size:
-    """How much is run. seeds: of the tables; the other counts: seeds of their parts; fit_points: by rig."""
+    """How much is run. seeds: of the tables; the other counts: seeds of their parts; claims: seeds of those
+    points of groups and strips that a sentence rests on; fit_points: by rig."""
 
     name: Literal["quick", "full"]
     seeds: int
@@ -60,11 +66,17 @@ class Size:
     groups: int
     map: int
     strips: int
+    claims: int
     fit_points: int
 
 
-FULL = Size(name="full", seeds=20, boards=3, variants=6, scenes=3, groups=3, map=2, strips=2, fit_points=128)
-QUICK = Size(name="quick", seeds=2, boards=1, variants=1, scenes=0, groups=0, map=0, strips=0, fit_points=0)
+FULL = Size(
+    name="full", seeds=20, boards=3, variants=6, scenes=3, groups=3, map=2, strips=2, claims=6,
+    fit_points=128,
+)  # fmt: skip
+QUICK = Size(
+    name="quick", seeds=2, boards=1, variants=1, scenes=0, groups=0, map=0, strips=0, claims=0, fit_points=0
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +106,9 @@ class BoardAsk:
 def asks(size: Size) -> tuple[Ask, ...]:
     """All runs; those that share a drive one after the other (`simbench/reuse.py`)."""
     found = [
-        *_tables(size.seeds), *_variants(size.variants), *_scenes(size.scenes), *_groups(size.groups),
-        *_map(size.map), *_strips(size.strips), *_fit(size.fit_points),
+        *_tables(size.seeds), *_variants(size.variants), *_scenes(size.scenes),
+        *_groups(size.groups, size.claims), *_map(size.map), *_strips(size.strips, size.claims),
+        *_fit(size.fit_points),
     ]  # fmt: skip
     return tuple(sorted(found, key=_drive))
 
@@ -159,11 +172,12 @@ def _scenes(seeds: int) -> Iterator[Ask]:
         yield Ask(part="scenes", cell=cell.name, point=(scene.name, condition), job=job)
 
 
-def _groups(seeds: int) -> Iterator[Ask]:
-    for cell, seed, mask in product(_first_cells(), range(seeds), range(1 << len(GROUPS))):
+def _groups(seeds: int, claims: int) -> Iterator[Ask]:
+    for cell, mask in product(_first_cells(), range(1 << len(GROUPS))):
         levels, acting = LEVELS[cell.system], tuple(g for i, g in enumerate(GROUPS) if mask >> i & 1)
-        job = cell.job(seed, faults_at(levels, at_bounds(levels, acting)), PIPELINES)
-        yield Ask(part="groups", cell=cell.name, point=(mask,), job=job)
+        for seed in range(claims if mask in MENDED else seeds):
+            job = cell.job(seed, faults_at(levels, at_bounds(levels, acting)), PIPELINES)
+            yield Ask(part="groups", cell=cell.name, point=(mask,), job=job)
 
 
 def _first_cells() -> tuple[Cell, ...]:
@@ -181,15 +195,16 @@ def _map(seeds: int) -> Iterator[Ask]:
             yield Ask(part="map", cell=cell.name, point=(offset_ms, shake_deg), job=job)
 
 
-def _strips(seeds: int) -> Iterator[Ask]:
-    for cell, seed in product(_first_cells(), range(seeds)):
+def _strips(seeds: int, claims: int) -> Iterator[Ask]:
+    for cell in _first_cells():
         levels = LEVELS[cell.system]
         for number, level in enumerate(levels):
             for value in strip_levels(level.bound, level.fault):
                 point = [0.0] * len(levels)
                 point[number] = value
-                job = cell.job(seed, faults_at(levels, point), PIPELINES)
-                yield Ask(part="strips", cell=cell.name, point=(level.name, value), job=job)
+                for seed in range(claims if level.name in ALONE else seeds):
+                    job = cell.job(seed, faults_at(levels, point), PIPELINES)
+                    yield Ask(part="strips", cell=cell.name, point=(level.name, value), job=job)
 
 
 def _fit(count: int) -> Iterator[Ask]:

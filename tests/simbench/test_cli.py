@@ -134,7 +134,16 @@ def test_every_verb_has_an_example_that_runs(
         return changed.model_copy(update={"systems": systems})
 
     tiny = Size(
-        name="quick", seeds=1, boards=1, variants=1, scenes=1, groups=1, map=1, strips=1, fit_points=0
+        name="quick",
+        seeds=1,
+        boards=1,
+        variants=1,
+        scenes=1,
+        groups=1,
+        map=1,
+        strips=1,
+        claims=1,
+        fit_points=0,
     )
     with (
         mock.patch("simbench.reproduce.plan.QUICK", tiny),

@@ -17,7 +17,7 @@ from simbench.reproduce.plan import Ask, BoardAsk, Size, asks, board_asks, fit_p
 from simbench.score.metrics import METRICS
 
 SMALL = Size(
-    name="full", seeds=6, boards=2, variants=6, scenes=3, groups=6, map=2, strips=2, fit_points=32,
+    name="full", seeds=6, boards=2, variants=6, scenes=3, groups=6, map=2, strips=2, claims=6, fit_points=32,
 )  # fmt: skip
 CLEAN = {BASELINE: 0.60, GROUND: 0.70, METHOD: 0.75, OURS: 0.85, ORACLE: 0.95}
 LOSS = {BASELINE: 0.50, GROUND: 0.40, METHOD: 0.20, OURS: 0.05, ORACLE: 0.0}

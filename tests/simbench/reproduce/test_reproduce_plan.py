@@ -118,7 +118,16 @@ def test_what_is_missing_is_what_the_ledger_does_not_hold(tmp_path: object) -> N
     from simbench.campaign.ledger import Done
 
     small = Size(
-        name="quick", seeds=1, boards=1, variants=0, scenes=0, groups=0, map=0, strips=0, fit_points=0
+        name="quick",
+        seeds=1,
+        boards=1,
+        variants=0,
+        scenes=0,
+        groups=0,
+        map=0,
+        strips=0,
+        claims=0,
+        fit_points=0,
     )
     with Ledger(Path(str(tmp_path)), {"what": "shen2023"}) as ledger:
         before = missing(small, ledger)
