@@ -11,8 +11,7 @@ from fusion.camera import PinholeCamera
 from fusion.geometry import readonly
 from scenarios.errors import BadInput
 from simbench.sensors import rays
-
-STEP = 1e-6  # of the finite differences that tell a fold
+from simbench.sensors.lens_kernel import undistort
 
 
 @lru_cache(maxsize=8)
@@ -31,12 +30,8 @@ def direction_planes(camera: PinholeCamera) -> Float64[np.ndarray, "h 3 w"]:
 
     Raises BadInput where a pixel has no direction, or the lens folds the picture over itself.
     """
-    u, v = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)
-    slope = camera.unproject(np.stack([u.ravel(), v.ravel()], axis=1))
-    if any(camera.distortion):
-        _check(slope, camera)
     direction = np.empty((camera.height_px, camera.width_px, 3))
-    direction[..., :2] = slope.reshape(camera.height_px, camera.width_px, 2)
+    direction[..., 0], direction[..., 1] = _slopes(camera)
     direction[..., 2] = 1.0
     direction /= np.sqrt(np.einsum("hwi,hwi->hw", direction, direction))[..., None]
     return readonly(direction.transpose(0, 2, 1))
@@ -70,17 +65,21 @@ def row_fans(camera: PinholeCamera) -> rays.Fans:
     return rays.make_fans(frame, slope, along[..., 2] / along[..., 0], rows, rows * camera.width_px, 1)
 
 
-def _check(slope: Float64[np.ndarray, "n 2"], camera: PinholeCamera) -> None:
-    """Every pixel has a bearing, and the lens keeps its orientation there: it was not found beyond a fold."""
-    lost = ~np.isfinite(slope).all(axis=1)
-    flat = np.column_stack([np.where(lost[:, None], 0.0, slope), np.ones(len(slope))])
-    here = camera.project(flat)
-    right = camera.project(flat + np.array([STEP, 0.0, 0.0])) - here
-    down = camera.project(flat + np.array([0.0, STEP, 0.0])) - here
-    lost |= right[:, 0] * down[:, 1] - right[:, 1] * down[:, 0] <= 0.0
-    if lost.any():
-        row, column = divmod(int(np.flatnonzero(lost)[0]), camera.width_px)
+def _slopes(camera: PinholeCamera) -> tuple[Float64[np.ndarray, "h w"], Float64[np.ndarray, "h w"]]:
+    """x / z and y / z of every pixel, as `PinholeCamera.unproject` has them."""
+    u, v = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)
+    x, y = (u - camera.cx_px) / camera.fx_px, (v - camera.cy_px) / camera.fy_px
+    if not any(camera.distortion):
+        return x, y
+    good = np.empty(x.size, dtype=np.bool_)
+    undistort(
+        x.ravel(), y.ravel(), camera.fx_px, camera.fy_px, *camera.distortion,
+        flat_x := x.flatten(), flat_y := y.flatten(), good,
+    )  # fmt: skip
+    if not good.all():
+        row, column = divmod(int(np.flatnonzero(~good)[0]), camera.width_px)
         raise BadInput(
             f"the lens distortion {camera.distortion} gives pixel ({column}, {row}) no direction: it is too "
             "strong for this field of view"
         )
+    return flat_x.reshape(x.shape), flat_y.reshape(y.shape)

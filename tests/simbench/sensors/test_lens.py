@@ -37,6 +37,17 @@ LENSES = st.tuples(
 
 @settings(max_examples=40)
 @given(distortion=LENSES)
+def test_a_whole_picture_s_directions_are_the_bits_that_its_pixels_have_one_by_one(
+    distortion: Distortion,
+) -> None:
+    lens = camera(distortion)
+    direction = np.concatenate([lens.unproject(centres()), np.ones((len(centres()), 1))], axis=1)
+    direction /= np.sqrt(np.einsum("ni,ni->n", direction, direction))[:, None]
+    assert np.array_equal(pixel_directions(lens).reshape(-1, 3), direction)
+
+
+@settings(max_examples=40)
+@given(distortion=LENSES)
 def test_a_point_along_a_pixels_direction_falls_on_its_centre(distortion: Distortion) -> None:
     lens = camera(distortion)
     direction = pixel_directions(lens).reshape(-1, 3)
