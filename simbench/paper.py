@@ -64,6 +64,9 @@ TABLE_II: Mapping[tuple[str, str], PaperTpr] = {
 }  # fmt: skip
 """By scenario and rig of ours; with Table III's columns."""
 
+PASSES = 2
+"""Trials of each scenario."""
+
 MAE: Mapping[str, PaperMae] = {
     "car": PaperMae(mean_m=1.15, sd_m=0.62, n=57),
     "wearable": PaperMae(mean_m=1.07, sd_m=0.68, n=45),

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("paper", type=click.Choice(["shen2023"]))
+@click.argument("paper", metavar="PAPER", type=click.Choice(["shen2023"]))
 @click.option("--quick", is_flag=True, help="A few runs of some parts: minutes, and wide intervals.")
 @click.option("--jobs", type=click.IntRange(1, 256), default=None, help="Processes (default: cores).")
 @click.option(

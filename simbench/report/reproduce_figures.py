@@ -12,11 +12,14 @@ from simbench.case import ORACLE
 from simbench.report import palette
 from simbench.report.figures import as_svg, grid
 from simbench.report.words import pipeline_words
-from simbench.reproduce.cells import BASELINE, GROUND, METHOD, OURS, PIPELINES
+from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS, PIPELINES
 from simbench.reproduce.conditions import ConditionTable
 from simbench.reproduce.effects import Mended
+from simbench.reproduce.elsewhere import Elsewhere
 from simbench.reproduce.fit.study import Fit
 from simbench.reproduce.grids import HeatMap, Strip
+from simbench.reproduce.sheets_paper import PARTS
+from simbench.reproduce.slopes import Slopes
 from simbench.reproduce.steps import Changed
 from simbench.score.statistics import Summary
 
@@ -25,6 +28,7 @@ COLOURS = {
     ORACLE: palette.ORACLE,
 }  # fmt: skip
 SHORT = {BASELINE: "raw box", GROUND: "box, no ground", METHOD: "P-Fusion", OURS: "robust", ORACLE: "oracle"}
+MARKERS = "osD"
 WIDE = 816.0
 
 
@@ -65,6 +69,38 @@ def tpr_bars(table: ConditionTable) -> Markup:
         figure.legend(loc="outside upper center", ncols=4)
 
     return as_svg(WIDE, 300, f"TPR by cell, {table.words}", draw)
+
+
+def budget_bars(table: ConditionTable) -> Markup:
+    """What the error of the method's raw positions is made of, a column a cell: signed means, 95 % over
+    runs."""
+
+    def draw(figure: Any) -> None:
+        plots = figure.subplots(1, len(table.cells), sharey=True, squeeze=False)[0]
+        for plot, cell in zip(plots, table.cells, strict=True):
+            for i, (axis, hatch) in enumerate((("longitudinal", ""), ("lateral", "///"))):
+                for y, part in enumerate(PARTS):
+                    one = cell.budget[axis][part]
+                    if one.mean is None:
+                        continue
+                    place = y + 0.38 * (i - 0.5)
+                    plot.barh(
+                        place, one.mean, height=0.36, color=palette.METHOD if i == 0 else palette.CLEAN,
+                        hatch=hatch, edgecolor="white", lw=0.3,
+                        label=axis if y == 0 and plot is plots[0] else None,
+                    )  # fmt: skip
+                    if one.ci95 is not None:
+                        plot.plot(one.ci95, [place, place], color=palette.INK, lw=1.1)
+            plot.axvline(0.0, color=palette.INK, lw=0.8)
+            plot.set_title(cell.cell)
+            plot.set_xlabel("m")
+            plot.set_xlim(-2.0, 2.0)
+            grid(plot, "x")
+        plots[0].set_yticks(range(len(PARTS)), [part.replace("_", " ") for part in PARTS])
+        plots[0].set_ylim(len(PARTS) - 0.5, -0.5)
+        figure.legend(loc="outside upper center", ncols=2)
+
+    return as_svg(WIDE, 250, f"Error budget, {table.words}", draw)
 
 
 def heat(maps: Sequence[HeatMap]) -> Markup:
@@ -182,10 +218,70 @@ def step_dots(rows: Sequence[Changed]) -> Markup:
     return as_svg(WIDE + 160, 70 + 21 * len(names), "One step or reading changed", draw)
 
 
+def slope_dots(rows: Sequence[Slopes]) -> Markup:
+    """TPR from none of a cause to its bound, the others anywhere within physics: a column a cell."""
+    mine = [one for one in rows if one.metric == "tpr"]
+    cells, names = (list(dict.fromkeys(getattr(one, k) for one in mine)) for k in ("cell", "pipeline"))
+    causes = list(dict.fromkeys(slope.cause for one in mine for slope in one.causes))
+
+    def draw(figure: Any) -> None:
+        plots = figure.subplots(1, len(cells), sharey=True, sharex=True, squeeze=False)[0]
+        for plot, cell in zip(plots, cells, strict=True):
+            for i, name in enumerate(names):
+                one = next(row for row in mine if row.cell == cell and row.pipeline == name)
+                for slope in one.causes:
+                    y = causes.index(slope.cause) + 0.24 * (i - 1)
+                    plot.plot(slope.ci, [y, y], color=COLOURS[name], lw=1.3)
+                    plot.plot(
+                        [slope.effect], [y], MARKERS[i], color=COLOURS[name], ms=4.5,
+                        label=SHORT[name] if slope is one.causes[0] and cell == cells[0] else None,
+                    )  # fmt: skip
+            plot.axvline(0.0, color=palette.INK, lw=0.8)
+            plot.set_title(cell)
+            plot.set_xlabel("change of TPR")
+            grid(plot, "x")
+            plot.locator_params(axis="x", nbins=4)
+        plots[0].set_yticks(range(len(causes)), causes, fontsize=8.5)
+        plots[0].set_ylim(len(causes) - 0.4, -0.6)
+        figure.legend(loc="outside upper center", ncols=len(names))
+
+    return as_svg(WIDE, 100 + 34 * len(causes), "What each cause costs amid the others", draw)
+
+
+def scene_dots(rows: Sequence[Elsewhere]) -> Markup:
+    """TPR of the baselines with one thing changed, a column a cell; the line: what the paper printed."""
+    changes = list(dict.fromkeys(one.what for one in rows))
+
+    def draw(figure: Any) -> None:
+        plots = figure.subplots(1, len(CELLS), sharey=True, sharex=True, squeeze=False)[0]
+        for plot, cell in zip(plots, CELLS, strict=True):
+            for one in (row for row in rows if row.cell == cell.name):
+                for i, name in enumerate((BASELINE, GROUND)):
+                    mean, y = one.tpr[name].mean, changes.index(one.what) + 0.22 * (2 * i - 1)
+                    if mean is None:
+                        continue
+                    none = one.condition == "none"
+                    words = f"{SHORT[name]}, {'no error' if none else 'all at bounds'}"
+                    plot.plot(
+                        [mean], [y], MARKERS[i], color=COLOURS[name], ms=6,
+                        mfc=COLOURS[name] if none else "none",
+                        label=words if one.what == changes[0] and cell is CELLS[0] else None,
+                    )  # fmt: skip
+            label = "paper, baseline" if cell is CELLS[0] else None
+            plot.axvline(cell.printed.baseline, color=palette.WRONG, lw=1.4, ls="--", label=label)
+            plot.set(title=cell.name, xlim=(0.0, 1.0), xlabel="TPR")
+            grid(plot, "x")
+        plots[0].set_yticks(range(len(changes)), changes, fontsize=8)
+        plots[0].set_ylim(len(changes) - 0.4, -0.6)
+        figure.legend(loc="outside upper center", ncols=5)
+
+    return as_svg(WIDE + 160, 110 + 30 * len(changes), "What would have to be different", draw)
+
+
 def _dot(plot: Any, y: float, difference: Summary) -> None:
     if difference.mean is None:
         return
-    colour = palette.RIGHT if difference.mean > 0 else palette.WRONG
+    colour = {1: palette.RIGHT, -1: palette.WRONG}.get(int(np.sign(difference.mean)), palette.MUTED)
     if difference.ci95 is not None:
         plot.plot(difference.ci95, [y, y], color=palette.INK, lw=1.1)
     else:

@@ -21,8 +21,9 @@ from simbench.reproduce.cells import BASELINE, CELLS, METHOD, OURS
 from simbench.reproduce.cost import Cost
 from simbench.reproduce.findings import findings
 from simbench.reproduce.plan import condition_faults
-from simbench.reproduce.sheets import COLUMNS, Sheet
-from simbench.reproduce.variants import variant_of
+from simbench.reproduce.sheet import Sheet
+from simbench.reproduce.variants import reference_of, variant_of
+from simbench.reproduce.words import COLUMNS, NONE, share
 from simbench.run import run_job
 
 NAME = "shen2023.html"
@@ -65,7 +66,10 @@ def write_page(
         told=told,
         findings=findings(told),
         by_name=by_name,
-        bars=[(table.words, table.condition, figures.tpr_bars(table)) for table in told.conditions],
+        bars=[
+            (table.words, table.condition, figures.tpr_bars(table), figures.budget_bars(table))
+            for table in told.conditions
+        ],
         drawn=drawn,
         heat=figures.heat(told.maps) if told.maps else None,
         strips=[
@@ -74,6 +78,8 @@ def write_page(
         ],
         mended=figures.mended_bars(told.mended) if told.mended else None,
         steps=figures.step_dots(told.steps) if told.steps else None,
+        slopes=figures.slope_dots(told.slopes) if told.slopes else None,
+        elsewhere=figures.scene_dots(told.elsewhere) if told.elsewhere else None,
         attributions=_attributions(told),
         fits=[
             (
@@ -83,7 +89,8 @@ def write_page(
             )
             for fit in told.fits
         ],
-        costs=[(_cost_name(name), cost) for name, cost in costs.items()],
+        costs=[(_cost_name(name), cost, _gains(told, name)) for name, cost in costs.items()],
+        cells=[cell.name for cell in CELLS],
         columns=COLUMNS,
         command=command,
         c=palette,
@@ -100,6 +107,16 @@ def _attributions(told: Answer) -> list[tuple[str, str, Markup, int]]:
             mine = [one for one in found if one.metric == metric and one.pipeline in (BASELINE, METHOD, OURS)]
             shown.append((cell, metric, bars(mine), width(mine)))
     return shown
+
+
+def _gains(told: Answer, name: str) -> list[str]:
+    """By cell: what a variant changes in TPR (points), as the table of steps has it."""
+    gains = {
+        one.cell: share(one.differences["tpr"].difference, signed=True)
+        for one in told.steps
+        if reference_of(one.name) == name and "tpr" in one.differences
+    }
+    return [gains.get(cell.name, NONE) for cell in CELLS]
 
 
 def _cost_name(name: str) -> str:

@@ -20,6 +20,8 @@ from simbench.reproduce.fit.study import Fit, fit_rig
 from simbench.reproduce.grids import HeatMap, Strip, heat_maps, strips
 from simbench.reproduce.levels import LEVELS
 from simbench.reproduce.plan import Size
+from simbench.reproduce.protocol import Dependence
+from simbench.reproduce.slopes import Slopes, slopes, varied
 from simbench.reproduce.steps import Changed, changes
 
 SCHEMA = "simbench-reproduction/1"
@@ -27,7 +29,8 @@ SCHEMA = "simbench-reproduction/1"
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """failures: what the bench could not run, which is in no number."""
+    """failures: what the bench could not run, which is in no number. varied: by cell, what the paper's frames
+    are worth if its passes differ as levels within physics do."""
 
     size: Size
     runs: int
@@ -40,6 +43,8 @@ class Answer:
     mended: tuple[Mended, ...]
     maps: tuple[HeatMap, ...]
     strips: tuple[Strip, ...]
+    slopes: tuple[Slopes, ...]
+    varied: dict[str, Dependence]
     fits: tuple[Fit, ...]
 
 
@@ -68,14 +73,25 @@ def answer(found: Found, executor: Executor) -> Answer:
         attributions=attributions(found),
         mended=mended(found, rng("mended")),
         maps=heat_maps(found),
-        strips=strips(found),
+        strips=strips(found, rng("strips")),
+        slopes=slopes(of_fits),
+        varied=varied(of_fits),
         fits=tuple(fit.result() for fit in fits),
     )
 
 
 def as_json(found: Answer) -> str:
-    """The stored result. ValueError: a number that is not finite."""
-    return json.dumps({"schema": SCHEMA, **asdict(found)}, indent=1, allow_nan=False) + "\n"
+    """The stored result, an entry of a list a line. ValueError: a number that is not finite."""
+    fields = {"schema": SCHEMA, **asdict(found)}
+    return (
+        "{\n" + ",\n".join(f"{json.dumps(name)}: {_lines(value)}" for name, value in fields.items()) + "\n}\n"
+    )
+
+
+def _lines(value: Any) -> str:
+    if not isinstance(value, list | tuple) or not value:
+        return json.dumps(value, allow_nan=False)
+    return "[\n" + ",\n".join(json.dumps(one, allow_nan=False) for one in value) + "\n]"
 
 
 def read_answer(text: str, file: str) -> Answer:

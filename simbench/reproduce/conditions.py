@@ -27,7 +27,9 @@ class CellTable:
     """One cell. raw, ground: the method against the box as it is, and after ground removal. pipelines: TPR
     over runs. missed_few: Eq. 5, the share of pairs that miss fewer than t1 points. premise: of the pairs
     with TPR above 0.5 the share whose representative point is right, and how many there are. readings: by
-    pipeline, then reading, mean over runs."""
+    pipeline, then reading, mean over runs. mae_m, mae_gnss_m: by pipeline, against the exact centre and the
+    held GNSS fix. budget: signed means [m] of the method's raw positions against the fix, by axis and part;
+    the two scenarios of a rig see opposite sides of the target, so that they must not be added up."""
 
     cell: str
     raw: TprTable
@@ -36,17 +38,18 @@ class CellTable:
     missed_few: dict[str, float | None]
     premise: dict[str, tuple[float | None, int]]
     readings: dict[str, dict[str, float | None]]
+    mae_m: dict[str, Summary]
+    mae_gnss_m: dict[str, Summary]
+    budget: dict[str, dict[str, Summary]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class RigTable:
-    """One rig over both scenarios. exact: MAE against the exact centre [m] by pipeline; budget: of the
-    method, signed means [m] by axis and part."""
+    """One rig over both scenarios. exact: MAE against the exact centre [m] by pipeline."""
 
     system: str
     mae: MaeTable
     exact: dict[str, Summary]
-    budget: dict[str, dict[str, Summary]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +91,15 @@ def _cell(found: Found, cell: Cell, condition: Condition, rng: np.random.Generat
             for name, of in runs.items()
             if name != ORACLE
         },
+        mae_m={name: summarize(values_of(of, "mae_m.smooth"), rng) for name, of in runs.items()},
+        mae_gnss_m={name: summarize(values_of(of, "mae_m.smooth.gnss"), rng) for name, of in runs.items()},
+        budget={
+            axis: {
+                part: summarize(values_of(runs[METHOD], f"budget_{axis}_m.{part}"), rng)
+                for part in BUDGET_PARTS
+            }
+            for axis in BUDGET_AXES
+        },
     )
 
 
@@ -104,8 +116,4 @@ def _rig(found: Found, system: str, condition: Condition, rng: np.random.Generat
         system=system,
         mae=mae_table(MAE[system], both(METHOD), rng),
         exact={name: over(name, "mae_m.smooth") for name in (*PIPELINES, ORACLE)},
-        budget={
-            axis: {part: over(METHOD, f"budget_{axis}_m.{part}") for part in BUDGET_PARTS}
-            for axis in BUDGET_AXES
-        },
     )

@@ -16,7 +16,7 @@ from simbench.reproduce.scenes import SCENES
 from simbench.score.statistics import Paired, Summary, paired, summarize
 
 AS_IT_IS = "as it is"
-ANY_DISTANCE = "whatever distance was annotated: the highest TPR that any gives"
+ANY_DISTANCE = "any annotated distance: the highest TPR"
 Values = Mapping[int, float | None]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 
-from simbench.reproduce.sheets import Sheet
+from simbench.reproduce.sheet import Sheet
 
 _ESCAPES = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{",

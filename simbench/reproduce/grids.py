@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import PIPELINES
-from simbench.reproduce.collect import mean_over
+from simbench.reproduce.collect import mean_over, values_of
 from simbench.reproduce.levels import LEVELS
+from simbench.score.statistics import Paired, paired
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,7 +29,8 @@ class HeatMap:
 @dataclass(frozen=True, kw_only=True)
 class Strip:
     """One pipeline in one cell under one cause alone: mean TPR and MAE [m] over n runs at each level, the
-    first level 0. bound: the highest level that is physical."""
+    first level 0. change: of the TPR, every level minus no error on the same seeds. bound: the highest level
+    that is physical."""
 
     cell: str
     pipeline: str
@@ -36,6 +40,7 @@ class Strip:
     level: tuple[float, ...]
     tpr: tuple[float | None, ...]
     mae_m: tuple[float | None, ...]
+    change: tuple[Paired, ...]
     n: int
 
 
@@ -60,7 +65,7 @@ def heat_maps(found: Found) -> tuple[HeatMap, ...]:
     return tuple(maps)
 
 
-def strips(found: Found) -> tuple[Strip, ...]:
+def strips(found: Found, rng: np.random.Generator) -> tuple[Strip, ...]:
     """By cell, cause and pipeline; without error as in the tables."""
     rows = []
     for cell in _cells(found, "strips"):
@@ -81,6 +86,9 @@ def strips(found: Found) -> tuple[Strip, ...]:
                         cell=cell, pipeline=pipeline, cause=level.name, unit=level.unit, bound=level.bound,
                         level=(0.0, *points), tpr=tuple(mean_over(runs, "tpr") for runs in at),
                         mae_m=tuple(mean_over(runs, "mae_m.smooth") for runs in at),
+                        change=tuple(
+                            paired(values_of(clean, "tpr"), values_of(runs, "tpr"), rng) for runs in at
+                        ),
                         n=min(len(runs) for runs in at),
                     )
                 )  # fmt: skip

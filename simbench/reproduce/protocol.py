@@ -3,7 +3,7 @@
 Frames of one pass are not independent. How much a draw of them is worth is said beside it: the intra-class
 correlation of frames within passes (ICC(1), one-way random effects by analysis of variance, groups of unequal
 sizes after Donner 1986), and the effective number of independent frames, n / (1 + (m - 1) ICC) with m the
-frames that a pass gives to the draw (Kish's design effect).
+frames of a pass (Kish's design effect).
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class Drawn:
 
 @dataclass(frozen=True, kw_only=True)
 class Dependence:
-    """icc: of frames within passes, of the difference after - before. effective_n: of a draw of n frames.
-    None: fewer than two passes, or none has two frames."""
+    """icc: of frames within passes, of the difference after - before. effective_n: how many independent
+    frames tell as much. None: fewer than two passes, or none has two frames."""
 
     icc: float | None
     effective_n: float | None
@@ -86,15 +86,13 @@ def _t(values: Float64[np.ndarray, "k n"], against: float) -> tuple[Float64[np.n
     return (values.mean(axis=1) - against) / (sd / np.sqrt(n)), max(n - 1, 1)
 
 
-def dependence(frames: Frames, n: int) -> Dependence:
-    """How much a draw of n of these frames is worth."""
+def dependence(frames: Frames, n: int, passes: int) -> Dependence:
+    """What n frames are worth that come from so many passes which differ as the passes of these frames do."""
     values = frames.after - frames.before
     icc = intra_class(values, frames.run)
     if icc is None:
         return Dependence(icc=None, effective_n=None)
-    passes = len(np.unique(frames.run))
-    each = min(n, len(values)) / passes
-    return Dependence(icc=icc, effective_n=min(n, len(values)) / (1.0 + max(each - 1.0, 0.0) * max(icc, 0.0)))
+    return Dependence(icc=icc, effective_n=n / (1.0 + max(n / passes - 1.0, 0.0) * max(icc, 0.0)))
 
 
 def intra_class(values: Float64[np.ndarray, " n"], group: Int64[np.ndarray, " n"]) -> float | None:

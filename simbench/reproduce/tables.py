@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float64
 
-from simbench.paper import PaperMae, PaperTpr
+from simbench.paper import PASSES, PaperMae, PaperTpr
 from simbench.reproduce.collect import Run
 from simbench.reproduce.protocol import Dependence, Drawn, Frames, chosen_rows, dependence, draw
 from simbench.score.statistics import Paired, Summary, paired, summarize
@@ -86,7 +86,7 @@ def tpr_table(
         pairs=len(frames.before),
         runs=len(two),
         drawn=_drawn(draw(frames, printed.n, rng, DRAWS)),
-        dependence=dependence(frames, printed.n),
+        dependence=dependence(frames, printed.n, PASSES),
         before=summarize(one, rng),
         after=summarize(two, rng),
         gain=paired(one, two, rng),

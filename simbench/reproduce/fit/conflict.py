@@ -13,12 +13,10 @@ import numpy as np
 from jaxtyping import Float64
 from scipy.special import logsumexp, ndtr
 
-from simbench.reproduce.fit.describe import limit2
 from simbench.reproduce.fit.infer import (
     Emulated,
     Observed,
     common_covariance,
-    distance_squared,
     spread,
     whitening,
 )
@@ -53,28 +51,6 @@ class Reach:
     slack: float
     reached: bool
     excluded: bool
-
-    @property
-    def words(self) -> str:
-        """One sentence."""
-        means = f"means from {self.lowest:.3f} to {self.highest:.3f}"
-        if self.reached:
-            return f"{self.observed:.3f} is reached: {means}"
-        if self.excluded:
-            return (
-                f"no level within the prior reaches {self.observed:.3f}: {means}, {self.gap:.3f} off at best"
-            )
-        return f"whether {self.observed:.3f} is reached is not known: {means}, the emulator is in doubt"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Together:
-    """All cells by one draw. distance2: squared Mahalanobis distance at the nearest; limit: of what fits."""
-
-    nearest: int
-    distance2: float
-    limit: float
-    reached: bool
 
 
 def conflict(
@@ -130,25 +106,6 @@ def reach(
             )
         )  # fmt: skip
     return tuple(found)
-
-
-def together(
-    cells: Emulated,
-    observed: Observed,
-    run_cov: Float64[np.ndarray, "k k"],
-    discrepancy_sd: float | Float64[np.ndarray, " k"],
-    level: float = 0.95,
-) -> Together:
-    """Whether some draw reaches all cells at once, its emulator's doubt counted in."""
-    white, _ = whitening(cells, common_covariance(observed, run_cov, discrepancy_sd))
-    distance2 = distance_squared(cells, observed.values, white)
-    nearest, limit = int(distance2.argmin()), limit2(len(observed.values), level)
-    return Together(
-        nearest=nearest,
-        distance2=float(distance2[nearest]),
-        limit=limit,
-        reached=bool(distance2[nearest] <= limit),
-    )
 
 
 def _log_density(

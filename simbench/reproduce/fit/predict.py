@@ -23,7 +23,8 @@ STEPS = 60  # of bisection
 
 @dataclass(frozen=True, kw_only=True)
 class Predictive:
-    """Of one printed number. tail_p: two-sided probability beyond it; None: nothing is printed."""
+    """Of one printed number. p5, p50, p95: what cannot be counts at the limit of what can. tail_p: two-sided
+    probability beyond it; None: nothing is printed."""
 
     mean: float
     sd: float
@@ -40,9 +41,11 @@ def predictive(
     printed: Observed,
     *,
     discrepancy_sd: float | Float64[np.ndarray, " k"] = 0.0,
+    possible: tuple[float, float] = (-np.inf, np.inf),
 ) -> tuple[Predictive, ...]:
     """Of every output that an emulator is given for; printed: its value (not a number: none), frames and
-    passes. ValueError: as many emulators as printed numbers are needed."""
+    passes. possible: least and greatest value that there can be. ValueError: as many emulators as printed
+    numbers are needed."""
     if len(emulators) != len(printed.values):
         raise ValueError(f"{len(emulators)} emulators for {len(printed.values)} printed numbers")
     falling = np.argsort(posterior.weights)[::-1]
@@ -52,12 +55,14 @@ def predictive(
     cells = emulated(emulators, posterior.draws[matter])
     sds = spread(cells, printed, run_covariance(emulators, independent=True), discrepancy_sd)
     return tuple(
-        _of(weights, Emulated(mean=cells.mean[:, [k]], sd=sds[:, [k]]), float(value))
+        _of(weights, Emulated(mean=cells.mean[:, [k]], sd=sds[:, [k]]), float(value), possible)
         for k, value in enumerate(printed.values)
     )
 
 
-def _of(weights: Float64[np.ndarray, " m"], normals: Emulated, printed: float) -> Predictive:
+def _of(
+    weights: Float64[np.ndarray, " m"], normals: Emulated, printed: float, possible: tuple[float, float]
+) -> Predictive:
     """Of one mixture of normals; its percentiles by bisection."""
     means, sds = normals.mean[:, 0], np.maximum(normals.sd[:, 0], 1e-12)
     mean = float(weights @ means)
@@ -69,7 +74,7 @@ def _of(weights: Float64[np.ndarray, " m"], normals: Emulated, printed: float) -
         middle = 0.5 * (low + high)
         under = ndtr((middle[:, None] - means) / sds) @ weights < shares
         low, high = np.where(under, middle, low), np.where(under, high, middle)
-    p5, p50, p95 = (0.5 * (low + high)).tolist()
+    p5, p50, p95 = np.clip(0.5 * (low + high), *possible).tolist()
     known = np.isfinite(printed)
     below = float(ndtr((printed - means) / sds) @ weights) if known else 0.0
     return Predictive(

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from scenarios.seeding import stream
-from simbench.paper import MAE, PaperTpr
+from simbench.paper import MAE, PASSES, PaperTpr
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import CELLS, METHOD, Cell
 from simbench.reproduce.collect import Run, values_of
@@ -41,7 +41,6 @@ CHECKED_DRAWS = 4_000  # of the prior, in the check on synthetic truths
 SHOWN = 400  # draws of the posterior that are kept for plots
 GRID = 21  # levels of a curve
 LEAST_VALUES = 8  # runs with a value, for an emulator
-PASSES = 2  # of each scenario: the paper's two trials
 DISCREPANCY = 0.05  # SD of TPR: what the bench's scene and the paper's may differ by at the same levels
 OTHERS = (0.0, 0.1)  # discrepancies with which the fit is made again
 
@@ -185,8 +184,7 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
             tuple(None if np.isnan(one) else float(one) for one in row)
             for row in posterior_correlations(posterior)
         ),
-        samples=tuple(tuple(row) for row in draws[posterior.resampled].tolist()),
-        plane=tuple(tuple(row) for row in at.mean[:SHOWN].tolist()),
+        samples=_drawn(draws[posterior.resampled]), plane=_drawn(at.mean[:SHOWN]),
         checked=_checked(design, values, draws[:CHECKED_DRAWS], emulators, rng("check"), system),
         predictions=_predictions(found, system, baseline, posterior, emulator, cells),
         sensitivity=tuple(
@@ -200,6 +198,11 @@ def fit_rig(found: Found, system: str, baseline: str) -> Fit:
             for again in (infer(draws, at, observed, run_cov, other, rng(f"again {other}"), keep=SHOWN),)
         ),
     )  # fmt: skip
+
+
+def _drawn(rows: Float64[np.ndarray, "n d"]) -> tuple[tuple[float, ...], ...]:
+    """For plots: four digits."""
+    return tuple(tuple(float(f"{value:.4g}") for value in row) for row in rows.tolist())
 
 
 def _baselines(printed: Sequence[PaperTpr]) -> Observed:
@@ -271,31 +274,53 @@ def _predictions(
     found: Found, system: str, baseline: str, posterior: Posterior,
     emulator: Callable[[Float64[np.ndarray, " n"]], Emulator], cells: Sequence[Cell],
 ) -> tuple[Predicted, ...]:  # fmt: skip
-    count, columns = found.size.fit_points, dict[str, tuple[Float64[np.ndarray, " n"], float, float, int]]()
+    count, asked = found.size.fit_points, list[_Asked]()
     for cell in cells:
         row = cell.printed
-        columns[f"{cell.name}: TPR of P-Fusion"] = (
-            _values(found, cell.name, METHOD, "tpr", count), row.fusion, row.fusion_sd, row.n,
-        )  # fmt: skip
-        columns[f"{cell.name}: SD of the paired difference"] = (
-            _gain_sd(found, cell.name, baseline, count), paired_sd(row), 0.0, row.n,
-        )  # fmt: skip
+        asked += [
+            _Asked(
+                what=f"{cell.name}: TPR of P-Fusion", values=_values(found, cell.name, METHOD, "tpr", count),
+                printed=row.fusion, frame_sd=row.fusion_sd, n=row.n, most=1.0, discrepancy=DISCREPANCY,
+            ),
+            _Asked(
+                what=f"{cell.name}: SD of the paired difference",
+                values=_gain_sd(found, cell.name, baseline, count), printed=paired_sd(row), n=row.n,
+            ),
+        ]  # fmt: skip
     both = [_values(found, cell.name, METHOD, "mae_m.smooth.gnss", count) for cell in cells]
     mae = MAE[system]
-    columns["both scenarios: MAE against the held GNSS (m)"] = (
-        np.mean(both, axis=0), mae.mean_m, mae.sd_m, mae.n,
+    asked.append(
+        _Asked(
+            what="both scenarios: MAE against the held GNSS (m)", values=np.mean(both, axis=0),
+            printed=mae.mean_m, frame_sd=mae.sd_m, n=mae.n,
+        )
     )  # fmt: skip
     return tuple(
         Predicted(
-            what=what,
+            what=one.what,
             predicted=predictive(
-                posterior, [emulator(values)],
-                Observed.of([value], passes=PASSES, frame_sd=[sd], frames=[n]),
+                posterior, [emulator(one.values)],
+                Observed.of([one.printed], passes=PASSES, frame_sd=[one.frame_sd], frames=[one.n]),
+                discrepancy_sd=one.discrepancy, possible=(0.0, one.most),
             )[0],
         )
-        for what, (values, value, sd, n) in columns.items()
-        if np.isfinite(values).sum() >= LEAST_VALUES  # an emulator of fewer would be none
+        for one in asked
+        if np.isfinite(one.values).sum() >= LEAST_VALUES  # an emulator of fewer would be none
     )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Asked:
+    """A number to predict: its values over the design [n], and how it was printed. most: the greatest that
+    there can be. discrepancy: SD; known for a TPR only."""
+
+    what: str
+    values: Float64[np.ndarray, " n"]
+    printed: float
+    n: int
+    frame_sd: float = 0.0
+    most: float = np.inf
+    discrepancy: float = 0.0
 
 
 def paired_sd(row: PaperTpr) -> float:

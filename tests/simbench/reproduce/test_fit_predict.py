@@ -72,6 +72,18 @@ def test_what_carries_no_weight_counts_for_nothing(emulators: list[Emulator]) ->
         assert (one.p5, one.p50, one.p95, one.tail_p) == pytest.approx((two.p5, two.p50, two.p95, two.tail_p))
 
 
+def test_what_cannot_be_counts_at_the_limit_of_what_can(emulators: list[Emulator]) -> None:
+    some, printed = (
+        posterior(rng(2).random((500, 2))),
+        Observed.of([0.9, 0.9], frame_sd=[0.9, 0.0], frames=[2, 2]),
+    )
+    wide, _ = predictive(some, emulators, printed)
+    share, _ = predictive(some, emulators, printed, possible=(0.0, 1.0))
+    assert wide.p5 < 0.0 and wide.p95 > 1.0
+    assert (share.p5, share.p50, share.p95) == (0.0, wide.p50, 1.0)
+    assert (share.mean, share.sd, share.tail_p) == (wide.mean, wide.sd, wide.tail_p)
+
+
 def test_an_emulator_for_every_number() -> None:
     with pytest.raises(ValueError, match="0 emulators for 1"):
         predictive(posterior(np.array([[0.5, 0.5]])), [], Observed.of([0.5]))

@@ -80,21 +80,28 @@ def test_it_depends_on_no_order_no_offset_and_no_unit(order: list[int], offset: 
 
 def test_frames_that_are_all_alike_within_a_pass_are_worth_one_each() -> None:
     frames = passes(5, 10, 0.3, 0.0)
-    found = dependence(frames, 50)
+    found = dependence(frames, 50, 5)
     assert found.icc == pytest.approx(1.0)
     assert found.effective_n == pytest.approx(5.0)
 
 
 def test_independent_frames_are_worth_what_they_count() -> None:
-    found = dependence(passes(300, 10, 0.0, 0.2), 19)
+    found = dependence(passes(300, 10, 0.0, 0.2), 19, 2)
     assert found.effective_n == pytest.approx(19.0)
+
+
+def test_two_passes_that_differ_make_ten_frames_worth_less_than_three() -> None:
+    """By hand: ICC 0.8, 5 frames a pass: 10 / (1 + 4 * 0.8) = 2.4."""
+    found = dependence(passes(4000, 2, 0.4, 0.2), 10, 2)
+    assert found.icc == pytest.approx(0.8, abs=0.02)
+    assert found.effective_n == pytest.approx(10 / (1 + 4 * found.icc))
 
 
 @pytest.mark.parametrize("groups", [np.zeros(8, dtype=np.int64), np.arange(8)])
 def test_one_pass_or_one_frame_each_tells_nothing_of_dependence(groups: np.ndarray) -> None:
     assert intra_class(np.arange(8.0), groups) is None
     frames = Frames(before=np.zeros(8), after=np.arange(8.0), run=groups)
-    assert dependence(frames, 5).effective_n is None
+    assert dependence(frames, 5, 2).effective_n is None
 
 
 def test_a_draw_of_all_frames_is_the_whole_and_its_tests_are_scipys() -> None:

@@ -20,7 +20,8 @@ from simbench.reproduce.files import as_csv, as_latex
 from simbench.reproduce.findings import as_markdown, findings
 from simbench.reproduce.fit.study import fit_rig
 from simbench.reproduce.levels import GROUPS
-from simbench.reproduce.sheets import reach_words, sheets
+from simbench.reproduce.sheets import sheets
+from simbench.reproduce.sheets_fit import reach_words
 from tests.simbench.reproduce.made_up import CLEAN, LOSS, SMALL, made_up
 
 FEWER = (
@@ -89,7 +90,7 @@ def test_levels_that_reach_both_cells_are_no_conflict(told: Answer) -> None:
 
 def test_the_same_runs_give_the_same_bytes(found: Found, told: Answer) -> None:
     again = answer(without_fits(found), Here())
-    assert as_json(again) == as_json(replace(told, size=again.size, fits=()))
+    assert as_json(again) == as_json(replace(told, size=again.size, fits=(), slopes=()))
     with FEWER[0], FEWER[1]:
         assert fit_rig(found, "car", BASELINE) == told.fits[0]
 
@@ -139,10 +140,15 @@ def test_the_stored_result_holds_finite_numbers_only(told: Answer) -> None:
     assert data["schema"] == "simbench-reproduction/1" and data["runs"] == told.runs
 
 
-def test_what_the_emulator_does_not_know_is_not_called_out_of_reach(told: Answer) -> None:
-    one = told.fits[0].reach[0]
+def test_a_cell_is_said_to_be_reached_by_a_level_or_by_chance_or_not_or_not_known(told: Answer) -> None:
+    one = replace(told.fits[0].reach[0], lowest=0.2, highest=0.4)
+    assert reach_words(replace(one, observed=0.3, reached=True)) == "some level gives it"
     said = [
-        reach_words(replace(one, reached=reached, excluded=excluded))
+        reach_words(replace(one, observed=0.5, reached=reached, excluded=excluded))
         for reached, excluded in ((True, False), (False, True), (False, False))
     ]
-    assert said == ["reached", "not reached", "not known, the emulator is in doubt"]
+    assert said == [
+        "no level gives it; the nearest is 10.0 points off, which chance and discrepancy allow",
+        "no level gives it; the nearest is 10.0 points off",
+        "not known: the nearest is 10.0 points off and the emulator is in doubt",
+    ]

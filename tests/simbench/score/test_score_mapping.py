@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fusion.messages import LidarScan
 from simbench.score.frames import frames_of
 from simbench.score.identity import best, identify, owners
-from simbench.score.mapping import PairScore, mapping_estimates, window_m
+from simbench.score.mapping import PairScore, mapping_estimates, most_within, window_m
 from simbench.score.score import score
 
 MS = 1_000_000
@@ -118,6 +118,18 @@ def test_without_pairs_every_target_metric_is_null_and_says_why():
     for name, estimate in mapping_estimates([], [[]], True).items():
         if name != "false_objects_per_frame":
             assert estimate.value is None and estimate.why, name
+
+
+@given(st.lists(st.floats(0, 30), max_size=30), st.floats(0.1, 5))
+def test_no_distance_has_more_points_around_it_than_the_one_with_most(distances, width_m):
+    """By trying every interval that begins at a point; and no reference gives more."""
+    distance_m = np.array(distances)
+    most = most_within(distance_m, width_m)
+    assert most == max(
+        (int(((distance_m >= d) & (distance_m <= d + width_m)).sum()) for d in distance_m), default=0
+    )
+    for reference_m in np.linspace(0, 30, 13):
+        assert np.count_nonzero(np.abs(distance_m - reference_m) <= 0.49999 * width_m) <= most
 
 
 @pytest.mark.parametrize(("category", "half"), [((4.5, 1.8, 1.5), 0.675), ((0.6, 1.5, 1.7), 0.225)])
