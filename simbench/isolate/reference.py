@@ -84,9 +84,9 @@ def _program(name: str, here: Path) -> list[str]:
 
 
 def _environment(here: Path) -> tuple[tuple[str, str], ...]:
-    """Ours, with PYTHONPATH that does not depend on the folder, and hashes that do not differ by run."""
-    found = dict(os.environ)
-    found.setdefault("PYTHONHASHSEED", "0")
+    """Ours, with PYTHONPATH that does not depend on the folder, and hashes that differ neither by run nor by
+    what runs it: dask's workers have a seed of their own."""
+    found = {**os.environ, "PYTHONHASHSEED": "0"}
     if path := found.get("PYTHONPATH"):
         found["PYTHONPATH"] = os.pathsep.join(str(here / entry) for entry in path.split(os.pathsep))
     return tuple(sorted(found.items()))

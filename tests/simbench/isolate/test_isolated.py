@@ -97,6 +97,7 @@ def test_neighbours_and_packages_of_the_users_folder_are_found(
     (folder / "elsewhere" / "far.py").write_text("C = 3")
     monkeypatch.setenv("PYTHONPATH", "elsewhere")
     monkeypatch.setenv("MY_LICENCE", "4")
+    monkeypatch.setenv("PYTHONHASHSEED", "6640")  # as dask's workers have it
     before = "import os, neighbour, package, far\nassert neighbour.A + package.B + far.C == 6\n"
     before += "assert os.environ['MY_LICENCE'] == '4' and os.environ['PYTHONHASHSEED'] == '0'"
     write(folder / "deep", "pass", before=before)
