@@ -107,7 +107,8 @@ def table_ii_test(table: ConditionTable) -> Sheet:
         notes=(
             "N pairs drawn at random from all runs and treated as independent: medians of 1,000 draws, 2.5 "
             "and 97.5 percentiles in brackets.",
-            "ICC: intra-class correlation of pairs within runs; effective n: what N of them are worth.",
+            "ICC: intra-class correlation of pairs within runs; effective n: what N of them are worth "
+            "that come from two passes, as the paper's do.",
         ),
     )  # fmt: skip
 
