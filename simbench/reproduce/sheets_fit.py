@@ -100,7 +100,6 @@ def predictions(fit: Fit) -> Sheet:
         rows=tuple(rows),
         notes=(
             f"A TPR may differ by {100 * fit.discrepancy:g} points (SD) at the same levels; for the others "
-            f"no "
-            "discrepancy is known, and none is taken.",
+            "no discrepancy is known, and none is taken.",
         ),
     )

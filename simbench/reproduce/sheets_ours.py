@@ -79,14 +79,16 @@ def mended(told: Answer) -> Sheet:
 
 def all_slopes(told: Answer) -> Sheet:
     """What each cause costs amid the others."""
+    metres_of = {(one.cell, one.pipeline): one.causes for one in told.slopes if one.metric != "tpr"}
     rows = [
         (
             one.cell, COLUMNS[one.pipeline], slope.cause,
             _changed(slope, 100.0, 1),
             _changed(metre, 1.0, 2), str(one.n), f"{one.r2:.2f}",
         )
-        for one, other in zip(told.slopes[::2], told.slopes[1::2], strict=True)
-        for slope, metre in zip(one.causes, other.causes, strict=True)
+        for one in told.slopes
+        if one.metric == "tpr"
+        for slope, metre in zip(one.causes, metres_of[one.cell, one.pipeline], strict=True)
     ]  # fmt: skip
     return Sheet(
         name="slopes",
@@ -95,8 +97,7 @@ def all_slopes(told: Answer) -> Sheet:
         rows=tuple(rows), texts=3,
         notes=(
             "Straight lines through the runs of the fit's design, in which all levels vary at once; the "
-            "nine or "
-            "eight intervals of a cell hold together at 95 %.",
+            "intervals of a cell and pipeline hold together at 95 %.",
         ),
     )  # fmt: skip
 

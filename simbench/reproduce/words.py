@@ -33,7 +33,7 @@ def _summary(one: Summary, scale: float, digits: int, signed: bool) -> str:
     mark = "+" if signed else ""
     mean = f"{scale * one.mean:{mark}.{digits}f}"
     if one.ci95 is not None:
-        return f"{mean} [{scale * one.ci95[0]:{mark}.{digits}f}, {scale * one.ci95[1]:{mark}.{digits}f}]"
+        return mean + interval(one, scale, digits, signed=signed)
     if one.n > 1 and one.low is not None and one.high is not None:
         return f"{mean} ({scale * one.low:{mark}.{digits}f} to {scale * one.high:{mark}.{digits}f})"
     return mean
@@ -83,9 +83,7 @@ def p_is(p: float) -> str:
 def interval(one: Summary, scale: float, digits: int, *, signed: bool = False) -> str:
     """The 95 % interval in brackets after a blank; nothing where there is none."""
     mark = "+" if signed else ""
-    low_high = one.ci95
-    return (
-        ""
-        if low_high is None
-        else f" [{scale * low_high[0]:{mark}.{digits}f}, {scale * low_high[1]:{mark}.{digits}f}]"
-    )
+    if one.ci95 is None:
+        return ""
+    low, high = one.ci95
+    return f" [{scale * low:{mark}.{digits}f}, {scale * high:{mark}.{digits}f}]"

@@ -123,6 +123,15 @@ def test_findings_answer_every_question_with_numbers(told: Answer) -> None:
             assert "None" not in line and "nan" not in line, line
 
 
+def test_shares_under_errors_say_under_which(told: Answer) -> None:
+    asked = {one.question: one.says for one in findings(told)}
+    reached = next(table for table in told.conditions if table.condition == "reached")
+    for question in ("Do the tables agree?", "Does the method do what it was made for?"):
+        assert reached.words in asked[question][0]
+    for line in asked["Does the method help when nothing is wrong?"]:
+        assert "no error injected" in line
+
+
 def test_a_stored_result_is_read_as_it_was(told: Answer) -> None:
     again = read_answer(as_json(told), "result.json")
     assert as_json(again) == as_json(told)
