@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from markupsafe import Markup
@@ -21,9 +21,9 @@ def width(found: Sequence[Attribution]) -> int:
     return 250 + 230 * len(found)
 
 
-def bars(found: Sequence[Attribution]) -> Markup:
+def bars(found: Sequence[Attribution], words: Callable[[str], str] = pipeline_words) -> Markup:
     """One metric. Filled: beyond chance among all dividends at once; the line is that interval (of the total
-    its own). To the right: costs; to the left: gains."""
+    its own). To the right: costs; to the left: gains. words: what a pipeline is called."""
     sets = list(dict.fromkeys(e.causes for a in found for e in shown(a)))
     sets.sort(key=lambda causes: (len(causes) or 99, causes))
     has_rest = any(a.remainder is not None for a in found)
@@ -49,7 +49,7 @@ def bars(found: Sequence[Attribution]) -> Markup:
                     _bar(plot, place, effect, of_total=place == 0)
             plot.axvline(0.0, color=palette.INK, lw=0.8)
             plot.axhline(0.5, color=palette.RULE, lw=0.8)
-            plot.set_title(pipeline_words(one.pipeline))
+            plot.set_title(words(one.pipeline))
             plot.grid(visible=True, axis="x")
             plot.tick_params(length=0)
             plot.locator_params(axis="x", nbins=5)

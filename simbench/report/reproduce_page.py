@@ -105,7 +105,7 @@ def _attributions(told: Answer) -> list[tuple[str, str, Markup, int]]:
     for cell, found in told.attributions.items():
         for metric in dict.fromkeys(one.metric for one in found):
             mine = [one for one in found if one.metric == metric and one.pipeline in (BASELINE, METHOD, OURS)]
-            shown.append((cell, metric, bars(mine), width(mine)))
+            shown.append((cell, metric, bars(mine, COLUMNS.__getitem__), width(mine)))
     return shown
 
 

@@ -1,8 +1,8 @@
 """What the groups of causes cost, alone and together, every one at its physical bound; and what mending one
 of them gives back while the others stay.
 
-Taken apart as `simbench explain` does (`explain/attribution.py`): every set of the groups was run, with the
-same seeds.
+Taken apart as `simbench explain` does (`explain/attribution.py`) where every set of the groups was run, with
+the same seeds.
 """
 
 from __future__ import annotations
@@ -34,13 +34,15 @@ class Mended:
 
 
 def attributions(found: Found) -> dict[str, tuple[Attribution, ...]]:
-    """By cell: every pipeline and metric, as losses."""
+    """By cell of which every set was run: every pipeline and metric, as losses."""
+    sets = {(ask.cell, ask.point) for ask in found.runs if ask.part == "groups"}
     cells = dict.fromkeys(ask.cell for ask in found.runs if ask.part == "groups")
     return {
         cell: tuple(
             _taken_apart(found, cell, pipeline, metric) for pipeline in PIPELINES for metric in LOSSES
         )
         for cell in cells
+        if all((cell, (mask,)) in sets for mask in range(EVERYTHING + 1))
     }
 
 

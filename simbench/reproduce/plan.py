@@ -6,7 +6,7 @@
 | tables | every cell, without errors, with all at bounds, and as the numbers are reached | II, III, MAE |
 | variants | the method with one step or reading changed | ablation, readings |
 | scenes | every cell in other scenes, without errors and with all at bounds | what must differ |
-| groups | S1: every set of the groups of causes, each at its bound | attribution, what to mend first |
+| groups | groups of causes at their bounds: every set in S1, else all and all but one | what to mend first |
 | map | trigger offset times body shake | heat map |
 | strips | each cause alone, up to far beyond its bound | frontiers |
 | fit | levels drawn from the prior, a Sobol sequence | which levels fit |
@@ -173,9 +173,11 @@ def _scenes(seeds: int) -> Iterator[Ask]:
 
 
 def _groups(seeds: int, claims: int) -> Iterator[Ask]:
-    for cell, mask in product(_first_cells(), range(1 << len(GROUPS))):
+    first = _first_cells()
+    for cell, mask in product(CELLS, range(1 << len(GROUPS))):
         levels, acting = LEVELS[cell.system], tuple(g for i, g in enumerate(GROUPS) if mask >> i & 1)
-        for seed in range(claims if mask in MENDED else seeds):
+        rest = seeds if cell in first else 0
+        for seed in range(claims if mask in MENDED else rest):
             job = cell.job(seed, faults_at(levels, at_bounds(levels, acting)), PIPELINES)
             yield Ask(part="groups", cell=cell.name, point=(mask,), job=job)
 

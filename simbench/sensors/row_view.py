@@ -1,8 +1,7 @@
 """Boxes where each row of the image has its own time, or where the lens bends straight lines.
 
-The outline is sampled: points on the rim of every primitive (the circle where sight lines touch an ellipsoid,
-the edges of a box), each projected at a few instants of the read-out and taken at the one at which the row
-that it falls on is exposed. Error of a rim of radius r px: below r (1 - cos(pi / RIM)), 0.1 px for 100 px.
+The outline is sampled (`rim.py`): points on the rim of every primitive, each projected at a few instants of
+the read-out and taken at the one at which the row that it falls on is exposed.
 """
 
 from __future__ import annotations
@@ -13,16 +12,16 @@ import numpy as np
 from jaxtyping import Bool, Float64, Int, Int64
 
 from fusion.camera import PinholeCamera
-from fusion.geometry import Transform, readonly
+from fusion.geometry import Transform
 from fusion.messages import BoxPx
 from simbench.motion import Motion, at
 from simbench.sensors import rays
 from simbench.sensors.boxes import View, Window
 from simbench.sensors.lens import pixel_directions, row_fans
 from simbench.sensors.outline import NEAR_M
+from simbench.sensors.rim import extent_px, rim_points
 from simbench.sensors.rows import Exposure, exposure_at, row_times_ns
 
-RIM = 72  # points around a rim
 INSTANTS = 4  # of an object's own part of the read-out, between which points move evenly
 STATIONS = 9  # along an edge that the lens may bend
 
@@ -124,24 +123,14 @@ class RowView(View):
             np.stack([centre for _, centre in frames]),
             STATIONS if self._bent else 2,
         )
-        if points is None or points[..., 2].min() < NEAR_M:
+        most = self._slope_most
+        box = None if points is None else extent_px(points, np.array(instants), self.camera, most)
+        if box is None:
             return (-1.0, -1.0, width + 1.0, height + 1.0)
-        uv = _on_their_rows(self._project(points), np.array(instants))
-        u, v = np.ascontiguousarray(uv.T)
-        x0, y0, x1, y1 = float(u.min()), float(v.min()), float(u.max()), float(v.max())
+        x0, y0, x1, y1 = box
         if x1 <= 0.0 or y1 <= 0.0 or x0 >= width or y0 >= height:
             return None
-        return (x0, y0, x1, y1)
-
-    def _project(self, points: Float64[np.ndarray, "k n 3"]) -> Float64[np.ndarray, "k n 2"]:
-        """Pixels of points in front of the camera. Beyond the corners of the image the lens is not defined:
-        there a point is drawn in to the corners' distance from the axis."""
-        slope = points[..., :2] / points[..., 2:]
-        if self._bent:
-            length = np.hypot(slope[..., 0], slope[..., 1])
-            slope = slope * np.minimum(1.0, self._slope_most / np.maximum(length, 1e-12))[..., None]
-        flat = np.concatenate([slope, np.ones((*slope.shape[:2], 1))], axis=-1).reshape(-1, 3)
-        return self.camera.project(flat).reshape(slope.shape)
+        return box
 
     def hiders(self, window: Window, geom: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
         """As `View.hiders`, at any instant of the read-out: by bounding spheres. The ground hides nothing."""
@@ -169,109 +158,3 @@ def _border_slopes(camera: PinholeCamera) -> tuple[np.ndarray, np.ndarray, float
     border = np.concatenate([direction[0], direction[-1], direction[:, 0], direction[:, -1]])
     slope = border[:, :2] / border[:, 2:]
     return slope.min(axis=0), slope.max(axis=0), float(np.hypot(slope[:, 0], slope[:, 1]).max())
-
-
-def _on_their_rows(
-    uv: Float64[np.ndarray, "k n 2"], row: Int64[np.ndarray, " k"]
-) -> Float64[np.ndarray, "n 2"]:
-    """Each of n tracks, given when k rows are exposed, where it is when the row under it is exposed."""
-    if len(uv) == 1:
-        return uv[0]
-    below = uv[:, :, 1] - (row + 0.5)[:, None]  # how far below the row that is exposed
-    passed = (below[:-1] > 0.0) & (below[1:] <= 0.0)
-    never = np.where(below[0] <= 0.0, 0, len(uv) - 2)  # above the first row, or below the last
-    before, n = np.where(passed.any(axis=0), passed.argmax(axis=0), never), np.arange(uv.shape[1])
-    a, b = below[before, n], below[before + 1, n]
-    share = np.clip(a / np.where(a == b, 1.0, a - b), 0.0, 1.0)[:, None]
-    found: np.ndarray = uv[before, n] + share * (uv[before + 1, n] - uv[before, n])
-    return found
-
-
-def rim_points(
-    kind: np.ndarray,
-    size_m: Float64[np.ndarray, "g 3"],
-    rotation: Float64[np.ndarray, "k g 3 3"],
-    centre_m: Float64[np.ndarray, "k g 3"],
-    stations: int,
-) -> Float64[np.ndarray, "k n 3"] | None:
-    """Points whose hull's image is the primitives' image, at k instants, in the optical frame.
-
-    Point n is the same one at every instant, or glides over the surface with the sight line. `stations`:
-    points along a straight edge, its ends included. None when the camera is inside a primitive.
-    """
-    along = np.linspace(-1.0, 1.0, stations)
-    found: list[np.ndarray] = []
-    box = kind == rays.BOX
-    if box.any():
-        local = _edges(stations)[None] * size_m[box][:, None, :]
-        found.append(_placed(rotation[:, box], local, centre_m[:, box]))
-    turn = np.linspace(0.0, 2.0 * np.pi, RIM, endpoint=False)
-    cylinder = kind == rays.CYLINDER
-    if cylinder.any():
-        ring = np.stack([np.cos(turn), np.sin(turn), np.ones(RIM)], axis=1)
-        rings = (ring * np.stack([np.ones_like(along), np.ones_like(along), along], axis=1)[:, None]).reshape(
-            -1, 3
-        )
-        local = rings[None] * size_m[cylinder][:, None, [0, 0, 1]]
-        found.append(_placed(rotation[:, cylinder], local, centre_m[:, cylinder]))
-    ball = (kind == rays.SPHERE) | (kind == rays.ELLIPSOID)
-    for which, places in ((kind == rays.CAPSULE, along), (ball, np.zeros(1))):
-        if not which.any():
-            continue
-        axes = np.where((kind[which] == rays.ELLIPSOID)[:, None], size_m[which], size_m[which][:, :1])
-        turned, axis = rotation[:, which], size_m[which][:, 1:2] * rotation[:, which][..., 2]
-        middle = np.concatenate([centre_m[:, which] + a * axis for a in places], axis=1)
-        rim = _touched(np.tile(turned, (1, len(places), 1, 1)), np.tile(axes, (len(places), 1)), middle, turn)
-        if rim is None:
-            return None
-        found.append(rim)
-    return np.concatenate(found, axis=1)
-
-
-@lru_cache(maxsize=4)
-def _edges(stations: int) -> Float64[np.ndarray, "n 3"]:
-    """Points along the edges of the cube from -1 to 1, every one once."""
-    places = [
-        np.insert(_square(), axis, a, axis=1) for axis in range(3) for a in np.linspace(-1.0, 1.0, stations)
-    ]
-    found: np.ndarray = np.unique(np.concatenate(places), axis=0)
-    return readonly(found)
-
-
-def _square() -> Float64[np.ndarray, "4 2"]:
-    return np.array([[x, y] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
-
-
-def _placed(
-    rotation: Float64[np.ndarray, "k g 3 3"],
-    local: Float64[np.ndarray, "g j 3"],
-    centre_m: Float64[np.ndarray, "k g 3"],
-) -> Float64[np.ndarray, "k n 3"]:
-    points = local @ rotation.swapaxes(2, 3) + centre_m[:, :, None]
-    return points.reshape(len(rotation), -1, 3)
-
-
-def _touched(
-    rotation: Float64[np.ndarray, "k g 3 3"],
-    axes_m: Float64[np.ndarray, "g 3"],
-    centre_m: Float64[np.ndarray, "k g 3"],
-    turn: Float64[np.ndarray, " j"],
-) -> Float64[np.ndarray, "k n 3"] | None:
-    """Where sight lines touch ellipsoids: scaled to a unit sphere with the eye at e, the circle about
-    e / |e|^2 of radius sqrt(1 - 1 / |e|^2), across e."""
-    eye = -(centre_m[:, :, None] @ rotation)[:, :, 0] / axes_m
-    square = (eye * eye).sum(axis=2)
-    if square.min() <= 1.0:
-        return None
-    # Across e, from the axis that is least along it in the middle of the read-out: the same at all instants.
-    least = np.abs(eye[len(eye) // 2]).argmin(axis=1)
-    first = np.cross(eye, np.eye(3)[least])
-    first /= np.linalg.norm(first, axis=2, keepdims=True)
-    second = np.cross(eye / np.sqrt(square)[..., None], first)
-    radius = np.sqrt(1.0 - 1.0 / square)[..., None, None]
-    circle = (
-        radius * (np.cos(turn)[:, None] * first[:, :, None] + np.sin(turn)[:, None] * second[:, :, None])
-        + (eye / square[..., None])[:, :, None]
-    )
-    points = (circle * axes_m[:, None]) @ rotation.swapaxes(2, 3) + centre_m[:, :, None]
-    return points.reshape(len(rotation), -1, 3)

@@ -15,7 +15,7 @@ from scenarios.errors import BadInput
 from simbench.campaign.local import Here
 from simbench.reproduce.answer import Answer, answer, as_json, read_answer
 from simbench.reproduce.campaign import Found
-from simbench.reproduce.cells import BASELINE, GROUND, METHOD, OURS
+from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS
 from simbench.reproduce.files import as_csv, as_latex
 from simbench.reproduce.findings import as_markdown, findings
 from simbench.reproduce.fit.study import fit_rig
@@ -57,6 +57,7 @@ def test_tables_hold_the_means_that_the_runs_were_made_with(told: Answer) -> Non
 
 
 def test_groups_that_add_up_have_equal_shares_and_no_interaction(told: Answer) -> None:
+    assert list(told.attributions) == ["car S1", "wearable S1"]
     for found in told.attributions.values():
         one = next(a for a in found if a.pipeline == BASELINE and a.metric == "tpr")
         assert one.total.summary.mean == pytest.approx(LOSS[BASELINE], abs=0.05)
@@ -65,6 +66,7 @@ def test_groups_that_add_up_have_equal_shares_and_no_interaction(told: Answer) -
 
 
 def test_mending_a_group_gives_back_its_share_and_the_algorithm_the_difference(told: Answer) -> None:
+    assert {one.cell for one in told.mended} == {cell.name for cell in CELLS}
     for one in told.mended:
         gained = one.tpr.difference.mean
         assert gained is not None

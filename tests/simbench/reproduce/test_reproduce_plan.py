@@ -17,7 +17,7 @@ from simbench.reproduce.campaign import missing, named
 from simbench.reproduce.cells import CELLS
 from simbench.reproduce.collect import Board, boards_read, key_of
 from simbench.reproduce.levels import GROUPS, LATE_CHANCE, LEVELS, at_bounds, faults_at, prior
-from simbench.reproduce.plan import FULL, QUICK, Size, asks, board_asks, fit_points, strip_levels
+from simbench.reproduce.plan import FULL, MENDED, QUICK, Size, asks, board_asks, fit_points, strip_levels
 from simbench.reproduce.variants import NAMES, reference_of, variant_of
 
 WHOLE = asks(FULL)
@@ -49,6 +49,14 @@ def test_the_paper_s_cells_have_at_least_twenty_seeds_under_every_condition() ->
                 a for a in WHOLE if a.part == "tables" and a.cell == cell.name and a.point == (condition,)
             ]
             assert len({ask.job.seed for ask in mine}) >= 20
+
+
+def test_each_thing_is_mended_in_every_cell_with_as_many_seeds_as_a_sentence_needs() -> None:
+    for cell in CELLS:
+        runs = [a for a in WHOLE if a.part == "groups" and a.cell == cell.name and a.point[0] in MENDED]
+        by_set = {mask: {a.job.seed for a in runs if a.point == (mask,)} for mask in MENDED}
+        assert len(by_set) == 1 + len(GROUPS)
+        assert all(len(seeds) == FULL.claims >= 6 for seeds in by_set.values())
 
 
 @RIGS

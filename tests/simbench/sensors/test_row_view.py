@@ -16,7 +16,8 @@ from simbench.sensors import rays
 from simbench.sensors.boxes import View, true_box
 from simbench.sensors.camera import look
 from simbench.sensors.outline import outline_px
-from simbench.sensors.row_view import RowView, rim_points, view_at
+from simbench.sensors.rim import rim_points
+from simbench.sensors.row_view import RowView, view_at
 from simbench.sensors.rows import exposure_at, row_times_ns
 from simbench.world import GROUND
 from tests.simbench.scenes import SystemName, scripted_motion, shaken_motion, staged
