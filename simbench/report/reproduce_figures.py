@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,10 @@ from markupsafe import Markup
 from simbench.case import ORACLE
 from simbench.report import palette
 from simbench.report.figures import as_svg, grid
-from simbench.report.words import pipeline_words
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS, PIPELINES
 from simbench.reproduce.conditions import ConditionTable
 from simbench.reproduce.effects import Mended
 from simbench.reproduce.elsewhere import Elsewhere
-from simbench.reproduce.fit.study import Fit
 from simbench.reproduce.grids import HeatMap, Strip
 from simbench.reproduce.sheets_paper import PARTS
 from simbench.reproduce.slopes import Slopes
@@ -74,33 +72,55 @@ def tpr_bars(table: ConditionTable) -> Markup:
 def budget_bars(table: ConditionTable) -> Markup:
     """What the error of the method's raw positions is made of, a column a cell: signed means, 95 % over
     runs."""
+    by_name = {cell.cell: cell for cell in table.cells}
+
+    def column(plot: Any, cell: str) -> None:
+        for i, (axis, hatch) in enumerate((("longitudinal", ""), ("lateral", "///"))):
+            for y, part in enumerate(PARTS):
+                one = by_name[cell].budget[axis][part]
+                if one.mean is None:
+                    continue
+                place, colour = y + 0.38 * (i - 0.5), palette.METHOD if i == 0 else palette.CLEAN
+                plot.barh(
+                    place, one.mean, height=0.36, color=colour, hatch=hatch, edgecolor="white", lw=0.3,
+                    label=axis,
+                )  # fmt: skip
+                if one.ci95 is not None:
+                    plot.plot(one.ci95, [place, place], color=palette.INK, lw=1.1)
+        plot.set_xlim(-2.0, 2.0)
+
+    parts = [part.replace("_", " ") for part in PARTS]
+    return _by_cell(WIDE, 250, f"Error budget, {table.words}", list(by_name), parts, "m", column)
+
+
+def _by_cell(
+    width: float,
+    height: float,
+    title: str,
+    cells: Sequence[str],
+    rows: Sequence[str],
+    what: str,
+    column: Callable[[Any, str], None],
+) -> Markup:
+    """Cells side by side, the same rows in each, about a line at zero; `column` draws one. what: along x."""
 
     def draw(figure: Any) -> None:
-        plots = figure.subplots(1, len(table.cells), sharey=True, squeeze=False)[0]
-        for plot, cell in zip(plots, table.cells, strict=True):
-            for i, (axis, hatch) in enumerate((("longitudinal", ""), ("lateral", "///"))):
-                for y, part in enumerate(PARTS):
-                    one = cell.budget[axis][part]
-                    if one.mean is None:
-                        continue
-                    place = y + 0.38 * (i - 0.5)
-                    plot.barh(
-                        place, one.mean, height=0.36, color=palette.METHOD if i == 0 else palette.CLEAN,
-                        hatch=hatch, edgecolor="white", lw=0.3,
-                        label=axis if y == 0 and plot is plots[0] else None,
-                    )  # fmt: skip
-                    if one.ci95 is not None:
-                        plot.plot(one.ci95, [place, place], color=palette.INK, lw=1.1)
+        plots = figure.subplots(1, len(cells), sharey=True, sharex=True, squeeze=False)[0]
+        for plot, cell in zip(plots, cells, strict=True):
+            column(plot, cell)
             plot.axvline(0.0, color=palette.INK, lw=0.8)
-            plot.set_title(cell.cell)
-            plot.set_xlabel("m")
-            plot.set_xlim(-2.0, 2.0)
+            plot.set_title(cell)
+            plot.set_xlabel(what)
             grid(plot, "x")
-        plots[0].set_yticks(range(len(PARTS)), [part.replace("_", " ") for part in PARTS])
-        plots[0].set_ylim(len(PARTS) - 0.5, -0.5)
-        figure.legend(loc="outside upper center", ncols=2)
+            plot.locator_params(axis="x", nbins=4)
+        plots[0].set_yticks(range(len(rows)), rows, fontsize=8.5)
+        plots[0].set_ylim(len(rows) - 0.4, -0.6)
+        handles, labels = plots[0].get_legend_handles_labels()
+        if labels:
+            once = dict(zip(labels, handles, strict=True))
+            figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=5)
 
-    return as_svg(WIDE, 250, f"Error budget, {table.words}", draw)
+    return as_svg(width, height, title, draw)
 
 
 def heat(maps: Sequence[HeatMap]) -> Markup:
@@ -201,21 +221,15 @@ def step_dots(rows: Sequence[Changed]) -> Markup:
     cells, names = (list(dict.fromkeys(getattr(r, k) for r in mine)) for k in ("cell", "name"))
     label = {one.name: f"{one.step or '–'} {one.title}: {one.what}" for one in mine}
 
-    def draw(figure: Any) -> None:
-        plots = figure.subplots(1, len(cells), sharey=True, sharex=True, squeeze=False)[0]
-        for plot, cell in zip(plots, cells, strict=True):
-            for y, name in enumerate(names):
-                one = next(r for r in mine if r.cell == cell and r.name == name)
-                _dot(plot, y, one.differences["tpr"].difference)
-            plot.axvline(0.0, color=palette.INK, lw=0.8)
-            plot.set_title(cell)
-            plot.set_xlabel("difference in TPR")
-            grid(plot, "x")
-            plot.locator_params(axis="x", nbins=4)
-        plots[0].set_yticks(range(len(names)), [label[name] for name in names], fontsize=8)
-        plots[0].set_ylim(len(names) - 0.4, -0.6)
+    def column(plot: Any, cell: str) -> None:
+        for one in mine:
+            if one.cell == cell:
+                _dot(plot, names.index(one.name), one.differences["tpr"].difference)
 
-    return as_svg(WIDE + 160, 70 + 21 * len(names), "One step or reading changed", draw)
+    return _by_cell(
+        WIDE + 160, 70 + 21 * len(names), "One step or reading changed", cells,
+        [label[name] for name in names], "difference in TPR", column,
+    )  # fmt: skip
 
 
 def slope_dots(rows: Sequence[Slopes]) -> Markup:
@@ -224,58 +238,52 @@ def slope_dots(rows: Sequence[Slopes]) -> Markup:
     cells, names = (list(dict.fromkeys(getattr(one, k) for one in mine)) for k in ("cell", "pipeline"))
     causes = list(dict.fromkeys(slope.cause for one in mine for slope in one.causes))
 
-    def draw(figure: Any) -> None:
-        plots = figure.subplots(1, len(cells), sharey=True, sharex=True, squeeze=False)[0]
-        for plot, cell in zip(plots, cells, strict=True):
-            for i, name in enumerate(names):
-                one = next(row for row in mine if row.cell == cell and row.pipeline == name)
-                for slope in one.causes:
-                    y = causes.index(slope.cause) + 0.24 * (i - 1)
-                    plot.plot(slope.ci, [y, y], color=COLOURS[name], lw=1.3)
-                    plot.plot(
-                        [slope.effect], [y], MARKERS[i], color=COLOURS[name], ms=4.5,
-                        label=SHORT[name] if slope is one.causes[0] and cell == cells[0] else None,
-                    )  # fmt: skip
-            plot.axvline(0.0, color=palette.INK, lw=0.8)
-            plot.set_title(cell)
-            plot.set_xlabel("change of TPR")
-            grid(plot, "x")
-            plot.locator_params(axis="x", nbins=4)
-        plots[0].set_yticks(range(len(causes)), causes, fontsize=8.5)
-        plots[0].set_ylim(len(causes) - 0.4, -0.6)
-        figure.legend(loc="outside upper center", ncols=len(names))
+    def column(plot: Any, cell: str) -> None:
+        for one in (row for row in mine if row.cell == cell):
+            i, colour = names.index(one.pipeline), COLOURS[one.pipeline]
+            for slope in one.causes:
+                y = causes.index(slope.cause) + 0.24 * (i - 1)
+                plot.plot(slope.ci, [y, y], color=colour, lw=1.3)
+                plot.plot([slope.effect], [y], MARKERS[i], color=colour, ms=4.5, label=SHORT[one.pipeline])
 
-    return as_svg(WIDE, 100 + 34 * len(causes), "What each cause costs amid the others", draw)
+    return _by_cell(
+        WIDE, 100 + 34 * len(causes), "What each cause costs amid the others", cells, causes,
+        "change of TPR", column,
+    )  # fmt: skip
 
 
 def scene_dots(rows: Sequence[Elsewhere]) -> Markup:
     """TPR of the baselines with one thing changed, a column a cell; the line: what the paper printed."""
     changes = list(dict.fromkeys(one.what for one in rows))
+    printed = {cell.name: cell.printed.baseline for cell in CELLS}
 
-    def draw(figure: Any) -> None:
-        plots = figure.subplots(1, len(CELLS), sharey=True, sharex=True, squeeze=False)[0]
-        for plot, cell in zip(plots, CELLS, strict=True):
-            for one in (row for row in rows if row.cell == cell.name):
-                for i, name in enumerate((BASELINE, GROUND)):
-                    mean, y = one.tpr[name].mean, changes.index(one.what) + 0.22 * (2 * i - 1)
-                    if mean is None:
-                        continue
-                    none = one.condition == "none"
-                    words = f"{SHORT[name]}, {'no error' if none else 'all at bounds'}"
+    def column(plot: Any, cell: str) -> None:
+        for one in (row for row in rows if row.cell == cell):
+            words = "no error" if one.condition == "none" else "all at bounds"
+            for i, name in enumerate((BASELINE, GROUND)):
+                mean, y, colour = (
+                    one.tpr[name].mean,
+                    changes.index(one.what) + 0.22 * (2 * i - 1),
+                    COLOURS[name],
+                )
+                if mean is not None:
+                    filled = colour if one.condition == "none" else "none"
                     plot.plot(
-                        [mean], [y], MARKERS[i], color=COLOURS[name], ms=6,
-                        mfc=COLOURS[name] if none else "none",
-                        label=words if one.what == changes[0] and cell is CELLS[0] else None,
-                    )  # fmt: skip
-            label = "paper, baseline" if cell is CELLS[0] else None
-            plot.axvline(cell.printed.baseline, color=palette.WRONG, lw=1.4, ls="--", label=label)
-            plot.set(title=cell.name, xlim=(0.0, 1.0), xlabel="TPR")
-            grid(plot, "x")
-        plots[0].set_yticks(range(len(changes)), changes, fontsize=8)
-        plots[0].set_ylim(len(changes) - 0.4, -0.6)
-        figure.legend(loc="outside upper center", ncols=5)
+                        [mean],
+                        [y],
+                        MARKERS[i],
+                        color=colour,
+                        ms=6,
+                        mfc=filled,
+                        label=f"{SHORT[name]}, {words}",
+                    )
+        plot.axvline(printed[cell], color=palette.WRONG, lw=1.4, ls="--", label="paper, baseline")
+        plot.set_xlim(0.0, 1.0)
 
-    return as_svg(WIDE + 160, 110 + 30 * len(changes), "What would have to be different", draw)
+    return _by_cell(
+        WIDE + 160, 110 + 30 * len(changes), "What would have to be different", list(printed), changes,
+        "TPR", column,
+    )  # fmt: skip
 
 
 def _dot(plot: Any, y: float, difference: Summary) -> None:
@@ -287,57 +295,3 @@ def _dot(plot: Any, y: float, difference: Summary) -> None:
     else:
         plot.plot(difference.points, [y] * len(difference.points), "|", color=palette.MUTED, ms=6)
     plot.plot([difference.mean], [y], "o", color=colour, ms=5)
-
-
-def posterior(fit: Fit) -> Markup:
-    """Where the prior puts the two cells and where the paper is; and what the fit makes of each level."""
-    columns = 5
-    rows = -(-(len(fit.levels) + 1) // columns)
-
-    def draw(figure: Any) -> None:
-        plots = figure.subplots(rows, columns, squeeze=False).ravel()
-        plane = np.array(fit.plane)
-        plots[0].plot(plane[:, 0], plane[:, 1], ".", ms=3, color=palette.CLEAN, alpha=0.6)
-        plots[0].plot(
-            [fit.observed[0]], [fit.observed[1]], "D", ms=8, mfc="none", mew=1.6, color=palette.WRONG
-        )
-        plots[0].set(xlim=(0, 1), ylim=(0, 1), xlabel=f"TPR, {fit.cells[0]}", ylabel=f"TPR, {fit.cells[1]}")
-        plots[0].set_title("prior (dots), paper (◇)")
-        samples = np.array(fit.samples)
-        for plot, level, column in zip(plots[1:], fit.levels, samples.T, strict=False):
-            bins = np.linspace(0.0, level.bound, 13)
-            plot.hist(column, bins=bins, color=palette.METHOD, density=True)
-            plot.axhline(1.0 / level.bound, color=palette.INK, lw=1.0, ls="--")
-            plot.set_title(level.name, fontsize=9.5)
-            plot.set_xlabel(level.unit)
-            plot.set_yticks([])
-        for plot in plots[len(fit.levels) + 1 :]:
-            plot.set_axis_off()
-
-    words = f"Posterior of the levels, {fit.system}, {pipeline_words(fit.baseline)}"
-    return as_svg(WIDE, 175 * rows, words, draw)
-
-
-def alone_curves(fit: Fit) -> Markup:
-    """The emulated baseline along one cause alone, both cells; dashed: what the paper printed."""
-    columns = 5
-    rows = -(-len(fit.levels) // columns)
-
-    def draw(figure: Any) -> None:
-        plots = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
-        for plot, level in zip(plots, fit.levels, strict=False):
-            curves = np.array(level.curve)
-            for k, (cell, colour) in enumerate(zip(fit.cells, (palette.RAW, palette.METHOD), strict=True)):
-                plot.plot(level.level, curves[:, k], color=colour, lw=1.6, marker="os"[k], markevery=5, ms=4,
-                          label=cell)  # fmt: skip
-                plot.axhline(fit.observed[k], color=colour, lw=1.1, ls="--")
-            plot.set_ylim(0.0, 1.0)
-            plot.set_title(level.name, fontsize=9.5)
-            plot.set_xlabel(level.unit)
-            grid(plot)
-        for plot in plots[len(fit.levels) :]:
-            plot.set_axis_off()
-        handles, labels = plots[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper center", ncols=2)
-
-    return as_svg(WIDE, 30 + 165 * rows, f"One cause alone, {fit.system}", draw)

@@ -16,6 +16,7 @@ from simbench.report import reproduce_figures as figures
 from simbench.report.choose import groups_of
 from simbench.report.explain_figure import bars, width
 from simbench.report.page import Section, section_of
+from simbench.report.reproduce_fit_figures import alone_curves, posterior
 from simbench.reproduce.answer import Answer
 from simbench.reproduce.cells import BASELINE, CELLS, METHOD, OURS
 from simbench.reproduce.cost import Cost
@@ -83,7 +84,7 @@ def write_page(
         attributions=_attributions(told),
         fits=[
             (
-                fit, figures.posterior(fit), figures.alone_curves(fit),
+                fit, posterior(fit), alone_curves(fit),
                 by_name[f"levels-{fit.system}-{fit.baseline}"],
                 by_name[f"predictions-{fit.system}-{fit.baseline}"],
             )

@@ -39,6 +39,6 @@ def run_reproduce(size: Size, *, workers: int | None, images: Images, out: Path)
     page = write_answer(told, out, images)
     for failure in told.failures:
         click.echo(f"failed: {failure}", err=True)
-    click.echo(f"{len(found.runs)} runs, {fresh} of them now, in {time.perf_counter() - begun:.0f} s")
+    click.echo(f"{told.runs} runs, {fresh} of them now, in {time.perf_counter() - begun:.0f} s")
     click.echo(f"report: {page}")
     return 3 if told.failures else 0

@@ -28,9 +28,8 @@ def boards(tables: Sequence[BoardTable]) -> Iterator[str]:
         printed = 100 * sum(table.printed) / len(table.printed)
         yield (
             f"{table.system}: TPR of a static board, mean over the cameras: paper {printed:.1f} %; ours "
-            f"{_share(table.mean)} with the calibration that was found, {_share(table.mean_true)} with the "
-            f"true "
-            f"one ({_runs(table.mean)})."
+            f"{_share(table.mean)} with the calibration that was found, {_share(table.mean_true)} with "
+            f"the true one ({_runs(table.mean)})."
         )
 
 
@@ -42,9 +41,8 @@ def agreement(table: ConditionTable, varied: Mapping[str, Dependence]) -> Iterat
         yield (
             f"{cell.cell}: paper {100 * printed.baseline:.1f} → {100 * printed.fusion:.1f} %; ours: raw box "
             f"{_share(cell.pipelines[BASELINE])}, box without ground {_share(cell.pipelines[GROUND])}, "
-            f"P-Fusion "
-            f"{_share(cell.pipelines[METHOD])}, robust {_share(cell.pipelines[OURS])}; oracle "
-            f"{_share(cell.pipelines[ORACLE])}."
+            f"P-Fusion {_share(cell.pipelines[METHOD])}, robust {_share(cell.pipelines[OURS])}; "
+            f"oracle {_share(cell.pipelines[ORACLE])}."
         )
         yield from _worth(cell, varied)
 
@@ -59,9 +57,8 @@ def _worth(cell: CellTable, varied: Mapping[str, Dependence]) -> Iterator[str]:
         return
     words = (
         f"{cell.cell}: the paper's {cell.raw.printed.n} frames of two passes are worth "
-        f"{alike.effective_n:.1f} independent ones if its passes had the same errors (intra-class "
-        f"correlation "
-        f"{alike.icc:.2f})"
+        f"{alike.effective_n:.1f} independent ones if its passes had the same errors "
+        f"(intra-class correlation {alike.icc:.2f})"
     )
     if apart is not None and apart.icc is not None and apart.effective_n is not None:
         words += (
@@ -99,14 +96,12 @@ def purpose(table: ConditionTable) -> Iterator[str]:
         premise = (
             ""
             if hit is None
-            else f" Where P-Fusion's TPR is above 50 %, its median point is on the target in "
-            f"{100 * hit:.1f} % "
-            f"of {above} pairs."
+            else f" Where P-Fusion's TPR is above 50 %, its median point is on the target "
+            f"in {100 * hit:.1f} % of {above} pairs."
         )
         yield (
-            f"{cell.cell}: fewer than {table.t1_points} of the target's points are missed (Eq. 5) in so "
-            f"many of "
-            f"{cell.raw.pairs} pairs: {few}.{premise}"
+            f"{cell.cell}: fewer than {table.t1_points} of the target's points are missed (Eq. 5) "
+            f"in so many of {cell.raw.pairs} pairs: {few}.{premise}"
         )
 
 
@@ -237,11 +232,10 @@ def metres_of(table: ConditionTable) -> Iterator[str]:
 
 def _metres_of_rig(rig: RigTable) -> str:
     return (
-        f"{rig.system}: paper {rig.mae.printed.mean_m:.2f} m; P-Fusion without errors {_m(rig.mae.gnss)} "
-        f"against "
-        f"the held GNSS and {_m(rig.mae.exact)} against the exact centre; robust {_m(rig.exact[OURS])} and "
-        f"the "
-        f"oracle's points {_m(rig.exact[ORACLE])} against the exact centre ({_runs(rig.mae.exact)})."
+        f"{rig.system}: paper {rig.mae.printed.mean_m:.2f} m; P-Fusion without errors "
+        f"{_m(rig.mae.gnss)} against the held GNSS and {_m(rig.mae.exact)} against the exact centre; "
+        f"robust {_m(rig.exact[OURS])} and the oracle's points {_m(rig.exact[ORACLE])} "
+        f"against the exact centre ({_runs(rig.mae.exact)})."
     )
 
 

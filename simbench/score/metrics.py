@@ -86,10 +86,8 @@ _MAPPING = (
         better="higher",
         per="pair",
         definition="The paper's TPR: share of an eligible pair's mapped points whose planar distance is "
-        "within "
-        "15 % of the category's longest horizontal side around the surface distance, mean over pairs, no "
-        "mapped "
-        "point counts 0.",
+        "within 15 % of the category's longest horizontal side around the surface distance, mean over "
+        "pairs, no mapped point counts 0.",
     ),
     Metric(
         name="tpr.centre",
@@ -126,8 +124,7 @@ _MAPPING = (
         better="higher",
         per="pair",
         definition="Share of an eligible pair's mapped points that hit the target by exact label, mean over "
-        "pairs, "
-        "no mapped point counts 0.",
+        "pairs, no mapped point counts 0.",
     ),
     Metric(
         name="precision.pooled",
@@ -142,8 +139,7 @@ _MAPPING = (
         better="higher",
         per="pair",
         definition="Share of the target's true points that project into the image which were mapped, mean "
-        "over "
-        "eligible pairs.",
+        "over eligible pairs.",
     ),
     Metric(
         name="recall.pooled",
@@ -237,8 +233,7 @@ _LOCALIZATION = (
         better="lower",
         per="eligible frame",
         definition=f"Share of eligible frames whose trajectory position is off by more than {GROSS_M:g} m "
-        "in the "
-        "plane, or missing.",
+        "in the plane, or missing.",
     ),
     Metric(
         name="lateral_clearance_error_m",
@@ -246,8 +241,7 @@ _LOCALIZATION = (
         better="lower",
         per="run",
         definition="Absolute lateral error of the trajectory in the eligible frame in which the target is "
-        "truly "
-        "closest.",
+        "truly closest.",
     ),
     Metric(
         name="ttc_error_s",
@@ -255,9 +249,8 @@ _LOCALIZATION = (
         better="lower",
         per="closing frame",
         definition="Mean absolute error of the time until the trajectory draws level (longitudinal gap over "
-        "closing "
-        f"speed, both limited to 0..{TTC_HORIZON_S:g} s) over eligible frames that truly close in within "
-        f"{TTC_HORIZON_S:g} s.",
+        f"closing speed, both limited to 0..{TTC_HORIZON_S:g} s) over eligible frames that truly close in "
+        f"within {TTC_HORIZON_S:g} s.",
     ),
     Metric(
         name="time_to_first_valid_s",
