@@ -36,6 +36,7 @@ def findings(told: Answer) -> tuple[Finding, ...]:
             say.alone(told.strips, "spin phase"),
         ),
         ("What does each cause cost amid the others?", say.amid(told.slopes)),
+        ("What do causes cost alone and together?", say.together(told.attributions)),
         (
             "How much of the paper's 1.15 m and 1.07 m is the algorithm?",
             say.metres_of(tables["none"]),

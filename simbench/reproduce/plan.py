@@ -56,7 +56,7 @@ ALONE = ("trigger offset", "spin phase")
 @dataclass(frozen=True, kw_only=True)
 class Size:
     """How much is run. seeds: of the tables; the other counts: seeds of their parts; claims: seeds of those
-    points of groups and strips that a sentence rests on; fit_points: by rig."""
+    strips that a sentence rests on; fit_points: by rig."""
 
     name: Literal["quick", "full"]
     seeds: int
@@ -71,7 +71,7 @@ class Size:
 
 
 FULL = Size(
-    name="full", seeds=20, boards=3, variants=6, scenes=3, groups=3, map=2, strips=2, claims=6,
+    name="full", seeds=20, boards=3, variants=6, scenes=3, groups=10, map=2, strips=2, claims=6,
     fit_points=128,
 )  # fmt: skip
 QUICK = Size(
@@ -107,7 +107,7 @@ def asks(size: Size) -> tuple[Ask, ...]:
     """All runs; those that share a drive one after the other (`simbench/reuse.py`)."""
     found = [
         *_tables(size.seeds), *_variants(size.variants), *_scenes(size.scenes),
-        *_groups(size.groups, size.claims), *_map(size.map), *_strips(size.strips, size.claims),
+        *_groups(size.groups), *_map(size.map), *_strips(size.strips, size.claims),
         *_fit(size.fit_points),
     ]  # fmt: skip
     return tuple(sorted(found, key=_drive))
@@ -172,12 +172,13 @@ def _scenes(seeds: int) -> Iterator[Ask]:
         yield Ask(part="scenes", cell=cell.name, point=(scene.name, condition), job=job)
 
 
-def _groups(seeds: int, claims: int) -> Iterator[Ask]:
+def _groups(seeds: int) -> Iterator[Ask]:
     first = _first_cells()
     for cell, mask in product(CELLS, range(1 << len(GROUPS))):
+        if cell not in first and mask not in MENDED:
+            continue
         levels, acting = LEVELS[cell.system], tuple(g for i, g in enumerate(GROUPS) if mask >> i & 1)
-        rest = seeds if cell in first else 0
-        for seed in range(claims if mask in MENDED else rest):
+        for seed in range(seeds):
             job = cell.job(seed, faults_at(levels, at_bounds(levels, acting)), PIPELINES)
             yield Ask(part="groups", cell=cell.name, point=(mask,), job=job)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from simbench.case import ORACLE
+from simbench.explain.attribution import Attribution, Effect
 from simbench.reproduce.boards import BoardTable
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS
 from simbench.reproduce.conditions import CellTable, ConditionTable, RigTable
@@ -205,6 +206,35 @@ def amid(rows: Sequence[Slopes]) -> Iterator[str]:
             f"{words or 'nothing is beyond chance'}"
             f"{f'; not beyond chance: {rest}' if words and rest else ''} (n = {one.n})."
         )
+
+
+def together(found: Mapping[str, Sequence[Attribution]]) -> Iterator[str]:
+    """Groups of causes, each at its bound, taken apart: those sets of them that count among all at once."""
+    for cell, rows in found.items():
+        for one in rows:
+            if one.pipeline != METHOD and (one.pipeline != BASELINE or one.metric != "tpr"):
+                continue
+            scale, unit, digits = (100.0, "points of TPR", 1) if one.metric == "tpr" else (1.0, "m of MAE", 2)
+            named = "; ".join(
+                f"{' and '.join(e.causes)} {scale * (e.summary.mean or 0.0):+.{digits}f}"
+                f"{_together(e, scale, digits)}{' beyond their smaller sets' if len(e.causes) > 1 else ''}"
+                for e in one.named
+            )
+            sure = f"beyond chance, all sets at once: {named}" if named else one.why
+            total = one.total.summary
+            yield (
+                f"{cell}, {COLUMNS[one.pipeline]}, loss in {unit} with everything at its bound "
+                f"{scale * (total.mean or 0.0):+.{digits}f}{interval(total, scale, digits, signed=True)}; "
+                f"{sure} (n = {total.n})."
+            )
+
+
+def _together(effect: Effect, scale: float, digits: int) -> str:
+    """The interval that holds for all sets at once."""
+    if effect.together is None:
+        return ""
+    low, high = (scale * bound for bound in effect.together)
+    return f" [{low:+.{digits}f}, {high:+.{digits}f}]"
 
 
 def metres_of(table: ConditionTable) -> Iterator[str]:

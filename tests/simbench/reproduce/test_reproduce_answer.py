@@ -9,10 +9,12 @@ import re
 from dataclasses import replace
 from unittest import mock
 
+import numpy as np
 import pytest
 
 from scenarios.errors import BadInput
 from simbench.campaign.local import Here
+from simbench.explain.attribution import attribute
 from simbench.reproduce.answer import Answer, answer, as_json, read_answer
 from simbench.reproduce.campaign import Found
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS
@@ -20,6 +22,7 @@ from simbench.reproduce.files import as_csv, as_latex
 from simbench.reproduce.findings import as_markdown, findings
 from simbench.reproduce.fit.study import fit_rig
 from simbench.reproduce.levels import GROUPS
+from simbench.reproduce.sentences import together
 from simbench.reproduce.sheets import sheets
 from simbench.reproduce.sheets_fit import reach_words
 from tests.simbench.reproduce.made_up import CLEAN, LOSS, SMALL, made_up
@@ -63,6 +66,30 @@ def test_groups_that_add_up_have_equal_shares_and_no_interaction(told: Answer) -
         assert one.total.summary.mean == pytest.approx(LOSS[BASELINE], abs=0.05)
         for effect in one.shapley:
             assert effect.summary.mean == pytest.approx(LOSS[BASELINE] / len(GROUPS), abs=0.05)
+
+
+def test_a_set_of_causes_is_told_only_where_it_counts_among_all_and_else_why_not(told: Answer) -> None:
+    shown = [
+        one
+        for rows in told.attributions.values()
+        for one in rows
+        if (one.pipeline, one.metric) in ((BASELINE, "tpr"), (METHOD, "tpr"), (METHOD, "mae_m.smooth"))
+    ]
+    lines = list(together(told.attributions))
+    assert len(lines) == len(shown) == 6
+    for one, line in zip(shown, lines, strict=True):
+        assert all(" and ".join(effect.causes) in line for effect in one.named)
+        assert (one.why in line) if not one.named else ("beyond chance, all sets at once" in line)
+
+
+def test_a_cause_that_costs_the_same_in_every_run_is_named_with_its_interval() -> None:
+    names, seeds = ("clocks", "boxes"), list(range(10))
+    drive = np.random.default_rng(0).normal(0.3, 0.02, 10)
+    both = drive + 0.1 + np.random.default_rng(1).normal(0.0, 0.002, 10)
+    table = np.array([drive, drive + 0.1 + np.random.default_rng(2).normal(0.0, 0.002, 10), drive, both])
+    line = next(together({"car S1": [attribute(table, names, seeds, pipeline=BASELINE, metric="tpr")]}))
+    assert re.search(r"everything at its bound \+(9\.\d|10\.\d) \[", line)
+    assert re.search(r"all sets at once: clocks \+(9\.\d|10\.\d) \[\+9\.\d, \+10\.\d\] \(n = 10\)", line)
 
 
 def test_mending_a_group_gives_back_its_share_and_the_algorithm_the_difference(told: Answer) -> None:

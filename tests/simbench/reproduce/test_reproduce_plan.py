@@ -56,7 +56,7 @@ def test_each_thing_is_mended_in_every_cell_with_as_many_seeds_as_a_sentence_nee
         runs = [a for a in WHOLE if a.part == "groups" and a.cell == cell.name and a.point[0] in MENDED]
         by_set = {mask: {a.job.seed for a in runs if a.point == (mask,)} for mask in MENDED}
         assert len(by_set) == 1 + len(GROUPS)
-        assert all(len(seeds) == FULL.claims >= 6 for seeds in by_set.values())
+        assert all(len(seeds) == FULL.groups >= 6 for seeds in by_set.values())
 
 
 @RIGS
