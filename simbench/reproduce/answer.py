@@ -19,7 +19,7 @@ from simbench.reproduce.elsewhere import Elsewhere, elsewhere
 from simbench.reproduce.fit.study import Fit, fit_rig
 from simbench.reproduce.grids import HeatMap, Strip, heat_maps, strips
 from simbench.reproduce.levels import LEVELS
-from simbench.reproduce.plan import Size
+from simbench.reproduce.plan import Size, drives
 from simbench.reproduce.protocol import Dependence
 from simbench.reproduce.slopes import Slopes, slopes, varied
 from simbench.reproduce.steps import Changed, changes
@@ -64,7 +64,7 @@ def answer(found: Found, executor: Executor) -> Answer:
     ]
     return Answer(
         size=found.size,
-        runs=len(found.runs) + len({(board.system, board.seed) for board in found.boards}),
+        runs=drives(found.runs) + len({(board.system, board.seed) for board in found.boards}),
         failures=found.failures,
         boards=board_tables(found.boards, rng("boards")),
         conditions=condition_tables(found, rng("conditions")),

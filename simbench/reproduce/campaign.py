@@ -53,8 +53,9 @@ def open_ledger(out: Path) -> Ledger:
 
 
 def missing(size: Size, ledger: Ledger) -> list[Ask | BoardAsk]:
-    """What is not there yet."""
-    return [ask for ask in _everything(size) if key_of(ask) not in ledger]
+    """What is not there yet, once where two parts ask for the same."""
+    asked = {key_of(ask): ask for ask in _everything(size)}
+    return [ask for key, ask in asked.items() if key not in ledger]
 
 
 def collect(size: Size, ledger: Ledger, workers: int, done: Callable[[Ask | BoardAsk, Done], None]) -> Found:

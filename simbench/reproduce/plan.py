@@ -14,7 +14,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Literal
@@ -111,6 +111,11 @@ def asks(size: Size) -> tuple[Ask, ...]:
         *_fit(size.fit_points),
     ]  # fmt: skip
     return tuple(sorted(found, key=_drive))
+
+
+def drives(found: Iterable[Ask]) -> int:
+    """How many drives these are: where two parts ask for the same, it is made once."""
+    return len({(ask.job, ask.whole) for ask in found})
 
 
 def board_asks(size: Size) -> tuple[BoardAsk, ...]:

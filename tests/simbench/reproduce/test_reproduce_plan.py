@@ -17,7 +17,17 @@ from simbench.reproduce.campaign import missing, named
 from simbench.reproduce.cells import CELLS
 from simbench.reproduce.collect import Board, boards_read, key_of
 from simbench.reproduce.levels import GROUPS, LATE_CHANCE, LEVELS, at_bounds, faults_at, prior
-from simbench.reproduce.plan import FULL, MENDED, QUICK, Size, asks, board_asks, fit_points, strip_levels
+from simbench.reproduce.plan import (
+    FULL,
+    MENDED,
+    QUICK,
+    Size,
+    asks,
+    board_asks,
+    drives,
+    fit_points,
+    strip_levels,
+)
 from simbench.reproduce.variants import NAMES, reference_of, variant_of
 
 WHOLE = asks(FULL)
@@ -28,6 +38,10 @@ def test_the_same_runs_are_asked_for_every_time_and_no_two_are_alike() -> None:
     for size in (QUICK, FULL):
         assert (board_asks(size), asks(size)) == (board_asks(size), asks(size))
         assert len({(ask.part, ask.cell, ask.point, ask.job.seed) for ask in asks(size)}) == len(asks(size))
+
+
+def test_a_drive_that_two_parts_ask_for_is_counted_once() -> None:
+    assert drives(WHOLE) == len({key_of(ask) for ask in WHOLE}) < len(WHOLE)
 
 
 def test_quick_runs_are_runs_of_the_whole() -> None:

@@ -10,7 +10,7 @@ from simbench.reproduce.answer import Answer, read_answer
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD
 from simbench.reproduce.findings import as_markdown
 from simbench.reproduce.levels import LEVELS, NONE_FAULTS
-from simbench.reproduce.plan import FULL, asks, board_asks
+from simbench.reproduce.plan import FULL, asks, board_asks, drives
 from simbench.run import run_job
 
 DOCS = Path(__file__).parents[3] / "docs"
@@ -26,7 +26,7 @@ def stored() -> Answer:
 
 def test_the_stored_result_is_of_the_whole_and_nothing_failed(stored: Answer) -> None:
     assert stored.size == FULL and stored.failures == ()
-    assert stored.runs == len(asks(FULL)) + len(board_asks(FULL)), AGAIN
+    assert stored.runs == drives(asks(FULL)) + len(board_asks(FULL)), AGAIN
     named = {fit.system: [(level.name, level.bound) for level in fit.levels] for fit in stored.fits}
     assert named == {s: [(one.name, one.bound) for one in levels] for s, levels in LEVELS.items()}, AGAIN
 
@@ -39,7 +39,7 @@ def test_what_the_readme_says_of_the_paper_stands_in_the_findings() -> None:
     readme = (DOCS.parent / "README.md").read_text()
     section = readme.split("## The paper, reproduced\n")[1].split("\n## ")[0]
     said = " ".join(section.split())
-    assert f"the paper's experiment {len(asks(FULL)):,} times" in said
+    assert f"the paper's experiment {drives(asks(FULL)):,} times" in said
     told = " ".join((DOCS / "findings.md").read_text().split()).split(" * ")
     quoted = [one for line in said.split(" * ")[1:] for one in [line.split(" ## ")[0].strip()]]
     assert len(quoted) >= 3
