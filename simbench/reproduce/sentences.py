@@ -282,7 +282,7 @@ def mending(rows: Sequence[Mended]) -> Iterator[str]:
         )
         yield (
             f"{cell}, everything at its physical bound, one thing mended: {words} "
-            f"({_runs(mine[0].tpr.difference)})."
+            f"({_runs(mine[0].tpr.difference)}; every interval by itself)."
         )
 
 

@@ -73,7 +73,7 @@ def mended(told: Answer) -> Sheet:
     return Sheet(
         name="mended", title="Everything at its physical bound, then one thing mended: change of P-Fusion",
         columns=("cell", "mended", "TPR (points)", "MAE (m)", "runs"), texts=2, rows=tuple(rows),
-        notes=("algorithm: robust in place of P-Fusion. MAE: below 0 is better.",),
+        notes=("algorithm: robust in place of P-Fusion. MAE: below 0 is better. Every interval by itself.",),
     )  # fmt: skip
 
 
