@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from simbench.case import ORACLE
-from simbench.explain.attribution import Attribution, Effect
+from simbench.explain.attribution import Attribution
 from simbench.reproduce.boards import BoardTable
 from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD, OURS
 from simbench.reproduce.conditions import CellTable, ConditionTable, RigTable
@@ -17,7 +17,7 @@ from simbench.reproduce.protocol import Dependence
 from simbench.reproduce.sheets_fit import fit_words
 from simbench.reproduce.slopes import Slopes
 from simbench.reproduce.steps import Changed
-from simbench.reproduce.words import COLUMNS, interval
+from simbench.reproduce.words import COLUMNS, bounds, interval
 from simbench.score.statistics import Paired, Summary
 
 LARGEST = 4  # parts of an error that are named
@@ -185,19 +185,26 @@ def alone(strips: Sequence[Strip], cause: str) -> Iterator[str]:
         )
 
 
+def _is_told(pipeline: str, metric: str) -> bool:
+    """Of all that was measured: both metrics of the method, the baseline's TPR."""
+    return pipeline == METHOD or (pipeline == BASELINE and metric == "tpr")
+
+
+def _unit(metric: str) -> tuple[float, str, int]:
+    """Scale, unit and digits of a change."""
+    return (100.0, "points of TPR", 1) if metric == "tpr" else (1.0, "m of MAE", 2)
+
+
 def amid(rows: Sequence[Slopes]) -> Iterator[str]:
     """What each cause costs the method, the others anywhere within physics."""
-    for one in rows:
-        if one.pipeline != METHOD and (one.pipeline != BASELINE or one.metric != "tpr"):
-            continue
-        scale, unit, digits = (100.0, "points of TPR", 1) if one.metric == "tpr" else (1.0, "m of MAE", 2)
+    for one in (row for row in rows if _is_told(row.pipeline, row.metric)):
+        scale, unit, digits = _unit(one.metric)
         sure = sorted(
             (slope for slope in one.causes if slope.ci[0] > 0.0 or slope.ci[1] < 0.0),
             key=lambda slope: -abs(slope.effect),
         )
         words = "; ".join(
-            f"{slope.cause} {scale * slope.effect:+.{digits}f} [{scale * slope.ci[0]:+.{digits}f}, "
-            f"{scale * slope.ci[1]:+.{digits}f}]"
+            f"{slope.cause} {scale * slope.effect:+.{digits}f}{bounds(slope.ci, scale, digits, signed=True)}"
             for slope in sure
         )
         rest = ", ".join(slope.cause for slope in one.causes if slope not in sure)
@@ -210,31 +217,22 @@ def amid(rows: Sequence[Slopes]) -> Iterator[str]:
 
 def together(found: Mapping[str, Sequence[Attribution]]) -> Iterator[str]:
     """Groups of causes, each at its bound, taken apart: those sets of them that count among all at once."""
-    for cell, rows in found.items():
-        for one in rows:
-            if one.pipeline != METHOD and (one.pipeline != BASELINE or one.metric != "tpr"):
-                continue
-            scale, unit, digits = (100.0, "points of TPR", 1) if one.metric == "tpr" else (1.0, "m of MAE", 2)
-            named = "; ".join(
-                f"{' and '.join(e.causes)} {scale * (e.summary.mean or 0.0):+.{digits}f}"
-                f"{_together(e, scale, digits)}{' beyond their smaller sets' if len(e.causes) > 1 else ''}"
-                for e in one.named
-            )
-            sure = f"beyond chance, all sets at once: {named}" if named else one.why
-            total = one.total.summary
-            yield (
-                f"{cell}, {COLUMNS[one.pipeline]}, loss in {unit} with everything at its bound "
-                f"{scale * (total.mean or 0.0):+.{digits}f}{interval(total, scale, digits, signed=True)}; "
-                f"{sure} (n = {total.n})."
-            )
-
-
-def _together(effect: Effect, scale: float, digits: int) -> str:
-    """The interval that holds for all sets at once."""
-    if effect.together is None:
-        return ""
-    low, high = (scale * bound for bound in effect.together)
-    return f" [{low:+.{digits}f}, {high:+.{digits}f}]"
+    told = ((cell, one) for cell, rows in found.items() for one in rows if _is_told(one.pipeline, one.metric))
+    for cell, one in told:
+        scale, unit, digits = _unit(one.metric)
+        named = "; ".join(
+            f"{' and '.join(e.causes)} {scale * (e.summary.mean or 0.0):+.{digits}f}"
+            f"{bounds(e.together, scale, digits, signed=True)}"
+            f"{' beyond their smaller sets' if len(e.causes) > 1 else ''}"
+            for e in one.named
+        )
+        sure = f"beyond chance, all sets at once: {named}" if named else one.why
+        total = one.total.summary
+        yield (
+            f"{cell}, {COLUMNS[one.pipeline]}, loss in {unit} with everything at its bound "
+            f"{scale * (total.mean or 0.0):+.{digits}f}{interval(total, scale, digits, signed=True)}; "
+            f"{sure} (n = {total.n})."
+        )
 
 
 def metres_of(table: ConditionTable) -> Iterator[str]:

@@ -7,7 +7,7 @@ from simbench.reproduce.cells import BASELINE, CELLS, GROUND, METHOD
 from simbench.reproduce.plan import SCENE_CONDITIONS
 from simbench.reproduce.sheet import Sheet
 from simbench.reproduce.slopes import Slope
-from simbench.reproduce.words import COLUMNS, NONE, metres, share
+from simbench.reproduce.words import COLUMNS, NONE, bounds, metres, share
 
 
 def steps(told: Answer) -> Sheet:
@@ -103,5 +103,4 @@ def all_slopes(told: Answer) -> Sheet:
 
 
 def _changed(one: Slope, scale: float, digits: int) -> str:
-    low, high = one.ci
-    return f"{scale * one.effect:+.{digits}f} [{scale * low:+.{digits}f}, {scale * high:+.{digits}f}]"
+    return f"{scale * one.effect:+.{digits}f}{bounds(one.ci, scale, digits, signed=True)}"

@@ -81,9 +81,13 @@ def p_is(p: float) -> str:
 
 
 def interval(one: Summary, scale: float, digits: int, *, signed: bool = False) -> str:
-    """The 95 % interval in brackets after a blank; nothing where there is none."""
-    mark = "+" if signed else ""
-    if one.ci95 is None:
+    """The 95 % interval as `bounds` writes it."""
+    return bounds(one.ci95, scale, digits, signed=signed)
+
+
+def bounds(ends: tuple[float, float] | None, scale: float, digits: int, *, signed: bool = False) -> str:
+    """An interval in brackets after a blank; nothing where there is none."""
+    if ends is None:
         return ""
-    low, high = one.ci95
+    mark, (low, high) = "+" if signed else "", ends
     return f" [{scale * low:{mark}.{digits}f}, {scale * high:{mark}.{digits}f}]"

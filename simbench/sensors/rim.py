@@ -18,13 +18,13 @@ from jaxtyping import Float64, Int, Int64
 from fusion.camera import PinholeCamera
 from fusion.geometry import readonly
 from fusion.messages import BoxPx
-from simbench.sensors import lens_kernel
+from simbench.sensors import lens_kernel, outline
 from simbench.sensors.compiled import jit, jit_inline, jit_with
+from simbench.sensors.lens_kernel import _distorted
 from simbench.sensors.outline import NEAR_M
 from simbench.sensors.rays import BOX, CAPSULE, CYLINDER, ELLIPSOID
 
 RIM = 72  # points around a rim
-_distorted = lens_kernel._distorted
 
 
 def rim_points(
@@ -177,7 +177,7 @@ def _rims(kind, size_m, rotation, centre_m, along, edges, circle, points):  # ty
     return True
 
 
-@jit_with(lens_kernel)
+@jit_with(lens_kernel, outline)
 def _extent(points, row, lens, slope_most):  # type: ignore[no-untyped-def]
     """Least and greatest pixels of points [k n 3], and whether one of them is too near."""
     fx, fy, cx, cy, k1, k2, p1, p2, k3 = lens

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from fusion.camera import PinholeCamera
 from simbench.motion import at
-from simbench.sensors import rays
 from simbench.sensors.boxes import View, true_box
 from simbench.sensors.camera import look
-from simbench.sensors.outline import outline_px
-from simbench.sensors.rim import rim_points
 from simbench.sensors.row_view import RowView, view_at
 from simbench.sensors.rows import exposure_at, row_times_ns
 from simbench.world import GROUND
 from tests.simbench.scenes import SystemName, scripted_motion, shaken_motion, staged
 
-CAMERA = PinholeCamera(fx_px=500.0, fy_px=480.0, cx_px=320.0, cy_px=240.0, width_px=640, height_px=480)
-ROUND = (rays.SPHERE, rays.CAPSULE, rays.ELLIPSOID, rays.CYLINDER, rays.BOX)
 BARREL = (-0.25, 0.06, 0.001, -0.001, 0.0)
 
 CASES: tuple[tuple[str, SystemName, str, float, float, tuple[float, float, float, float, float]], ...] = (
@@ -100,32 +91,3 @@ def test_with_one_time_for_all_rows_the_boxes_are_those_of_one_instant() -> None
 def test_a_straight_lens_and_a_global_shutter_need_no_rows() -> None:
     of = staged("overtake-recede", "car", 5)
     assert type(view_at(scripted_motion(of), "cam-front", of.rig.pinholes["cam-front"], 10**9, 0.0)) is View
-
-
-@settings(max_examples=60)
-@given(kinds=st.lists(st.sampled_from(ROUND), min_size=1, max_size=3), seed=st.integers(0, 2**31))
-def test_the_rims_span_the_analytic_outline(kinds: list[int], seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    size = rng.uniform(0.05, 1.0, (len(kinds), 3))
-    rotation = np.empty((len(kinds), 3, 3))
-    for i, q in enumerate(rng.standard_normal((len(kinds), 4))):
-        matrix = np.empty(9)
-        mujoco.mju_quat2Mat(matrix, q / np.linalg.norm(q))
-        rotation[i] = matrix.reshape(3, 3)
-    centre = np.column_stack([rng.uniform(-3, 3, (len(kinds), 2)), rng.uniform(4.0, 20.0, len(kinds))])
-    exact = outline_px(np.array(kinds), size, rotation, centre, CAMERA)
-    points = rim_points(np.array(kinds), size, rotation[None], centre[None], 2)
-    assert exact is not None and points is not None
-    uv = CAMERA.project(points[0])
-    found = np.concatenate([uv.min(axis=0), uv.max(axis=0)])
-    size_px = max(exact[2] - exact[0], exact[3] - exact[1])
-    np.testing.assert_allclose(found, exact, rtol=0, atol=2e-3 * size_px)
-    assert np.all(found[:2] >= np.array(exact[:2]) - 1e-9)
-    assert np.all(found[2:] <= np.array(exact[2:]) + 1e-9)
-
-
-def test_inside_a_ball_there_is_no_rim() -> None:
-    assert (
-        rim_points(np.array([rays.SPHERE]), np.ones((1, 3)), np.eye(3)[None, None], np.zeros((1, 1, 3)), 2)
-        is None
-    )
